@@ -1,0 +1,96 @@
+"""What was recorded: frozen time series, SI units, no files and no ROS.
+
+Times are seconds after the recording's first stamp (over all its topics), as measured by
+the clock of each device; ``Recording.start_ns`` is that first stamp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Samples of one quantity on one device's clock: finite, strictly increasing in time."""
+
+    time: Array  # (n,) s after the recording's start
+    values: Array  # (n, width)
+
+
+@dataclass(frozen=True)
+class ChannelQuality:
+    """What was found in one topic before it was used."""
+
+    topic: str
+    count: int  # messages in the bag
+    used: int  # samples that went into Series
+    rate: float  # Hz, median
+    start: float  # s after the recording's start, first used sample
+    end: float  # s, last used sample
+    gaps: int  # intervals longer than 1.5 median intervals
+    missing: int  # samples that those gaps would hold
+    longest_gap: float  # s
+    duplicated: int  # stamps equal to an earlier one
+    backward: int  # stamps before an earlier one
+    not_finite: int  # samples with NaN or infinity where a number is due
+    clipped: int  # samples stuck at the extreme value of the channel
+    notes: tuple[str, ...] = ()  # sentences for the report
+
+
+@dataclass(frozen=True)
+class Dummy:
+    """A known mass fixed at a known point for one static recording."""
+
+    mass: float  # kg
+    position: Array  # (3,) m, body
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One bag of a session. A topic that is missing is None (or absent from ``tension``)."""
+
+    name: str
+    kind: str  # "static" or "dynamic"
+    holdout: bool
+    start_ns: int  # first stamp of the recording
+    duration: float  # s, from the first to the last stamp
+    dummy: Dummy | None = None
+    tension: dict[str, Series] = field(default_factory=dict)  # cable name -> (n, 1) N, positive pulls
+    exciter_force: Series | None = None  # (n, 3) N, exciter frame, on the body
+    exciter_shaft: Series | None = None  # (n, 2) angle rad, rate rad/s
+    imu: Series | None = None  # (n, 6) angular rate rad/s, specific force m/s^2, imu frame
+    inclination: Series | None = None  # (n, 2) rad, x and y axis above the horizontal plane
+    mocap: Series | None = None  # (n, 7) position m, quaternion xyzw of marker frame in tracker frame
+    ground_truth: Series | None = None  # (n, 13) position, quaternion xyzw of body in world; body twist
+    quality: tuple[ChannelQuality, ...] = ()
+
+
+@dataclass(frozen=True)
+class Session:
+    """One body on one rig on one day."""
+
+    name: str
+    rig: Rig
+    recordings: tuple[Recording, ...]
+
+    @property
+    def statics(self) -> tuple[Recording, ...]:
+        """Recordings in which the body hangs at rest."""
+        return tuple(r for r in self.recordings if r.kind == "static")
+
+    @property
+    def training(self) -> tuple[Recording, ...]:
+        """Dynamic recordings that parameters are fitted to."""
+        return tuple(r for r in self.recordings if r.kind == "dynamic" and not r.holdout)
+
+    @property
+    def holdouts(self) -> tuple[Recording, ...]:
+        """Dynamic recordings that only score the fit."""
+        return tuple(r for r in self.recordings if r.kind == "dynamic" and r.holdout)

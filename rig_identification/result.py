@@ -1,0 +1,97 @@
+"""What the tool answers with: frozen values, SI units (recording contract, section "Result")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Order of the covariance and of names in ``unobservable``.
+ELEMENTS = ("m", "cx", "cy", "cz", "Jxx", "Jxy", "Jxz", "Jyy", "Jyz", "Jzz")
+
+
+@dataclass(frozen=True)
+class InertialEstimate:
+    """Mass, centre of mass (body frame) and inertia about it (body axes), with their joint covariance."""
+
+    values: Array  # (10,) in the order of ELEMENTS: kg, m, kg m^2
+    covariance: Array  # (10, 10)
+    unobservable: tuple[str, ...] = ()  # names of ELEMENTS that the recordings cannot determine
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """One fitted nuisance parameter beside what the lab believed of it."""
+
+    name: str  # e.g. "cable_1.length"
+    unit: str
+    nominal: float  # value of the description
+    prior_std: float  # tolerance
+    value: float
+    std: float  # posterior
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """One measured channel of one recording against its prediction."""
+
+    recording: str
+    channel: str  # "cable_1", "imu", "inclinometer", "exciter", "mocap"
+    quantity: str  # "tension", "angular_rate", "specific_force", "inclination", "position", "orientation"
+    axis: str | None  # "x", "y", "z" or None
+    unit: str
+    noise_std: float  # of one sample
+    noise_estimated: bool  # True: estimated from the recordings, False: from the description
+    time: Array  # (n,) s after the recording's start
+    measured: Array  # (n,)
+    predicted: Array  # (n,)
+
+    @property
+    def residual_in_sigma(self) -> Array:
+        """(n,) measured less predicted, in units of the noise of one sample."""
+        return np.asarray((self.measured - self.predicted) / self.noise_std)
+
+    @property
+    def rms_in_sigma(self) -> float:
+        """Root mean square of :attr:`residual_in_sigma`: 1 is a perfect model."""
+        return float(np.sqrt(np.mean(self.residual_in_sigma**2)))
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One piece of physics or one sensor error that the ideal model left out."""
+
+    effect: str  # a word of the contract's table, or "unknown"
+    where: dict[str, object]
+    parameters: dict[str, dict[str, object]]  # name -> {"value", "std", "unit"}
+    evidence: dict[str, float | None]
+    statement: str
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """Whether, where and why the ideal model fails."""
+
+    verdict: str  # "none", "explained" or "unexplained"
+    explanation: str  # one or two sentences for a person: on what the verdict rests
+    findings: tuple[Finding, ...] = ()
+    alternatives: tuple[dict[str, object], ...] = ()
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Everything that ``identify`` found out about a session."""
+
+    total: InertialEstimate
+    without_frame: InertialEstimate | None
+    mismatch: Mismatch
+    parameters: tuple[ParameterEstimate, ...]
+    channels: tuple[ChannelFit, ...]  # training, statics and holdout alike
+    holdout_error: float | None  # contract: rms of held-out prediction errors in units of noise
+    training_error: float
+    converged: bool
+    notes: tuple[str, ...] = ()  # sentences for the report: warnings, what was left aside
+    figures: dict[str, object] = field(default_factory=dict)  # numbers behind further pictures
