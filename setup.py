@@ -1,0 +1,59 @@
+"""ament_python package: `pip install .` and `colcon build` both read this file."""
+
+import re
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "rig_identification"
+ROOT = Path(__file__).parent
+VERSION = re.search(r'__version__ = "(.+)"', (ROOT / NAME / "__init__.py").read_text())[1]
+
+# The ROS wheels exist for this platform alone; elsewhere rclpy comes with a Jazzy installation.
+ROS_WHEELS = '; platform_system == "Linux" and platform_machine == "x86_64"'
+
+
+def shared(folder: str, *patterns: str) -> tuple[str, list[str]]:
+    """Files of a root folder that go to ``share/rig_identification/<folder>``."""
+    files = sorted(str(p.relative_to(ROOT)) for pattern in patterns for p in (ROOT / folder).glob(pattern))
+    return f"share/{NAME}/{folder}", files
+
+
+# One line a ROS node, "name = rig_identification.nodes.name:main".
+NODES: list[str] = []
+
+setup(
+    name=NAME,
+    version=VERSION,
+    description="Mass, centre of mass and inertia tensor of a body on a cable rig, and what its model left out",
+    long_description=(ROOT / "README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    author="rig_identification maintainers",
+    maintainer="rig_identification maintainers",
+    license="Apache-2.0",
+    python_requires=">=3.10",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"], f"{NAME}.report": ["templates/*"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        shared("config", "*.yaml"),
+        shared("launch", "*.launch.py"),
+    ],
+    zip_safe=False,
+    install_requires=[
+        "jinja2>=3.1",
+        "numba>=0.59",
+        "numpy>=1.24",
+        "PyYAML>=6.0",
+        "rich>=13.0",
+        "rosbags>=0.10",
+        "scipy>=1.11",
+    ],
+    extras_require={
+        "ros": [f"ros-jazzy-rclpy[fastrtps]{ROS_WHEELS}", f"ros-jazzy-common-interfaces{ROS_WHEELS}"],
+        "test": ["hypothesis>=6.90", "pytest>=8.0", "ruff>=0.9"],
+        "dev": ["mujoco>=3.1", "mypy>=1.10", "ruff>=0.9", "types-PyYAML"],
+    },
+    entry_points={"console_scripts": ["rig-identification = rig_identification.cli.main:main", *NODES]},
+)
