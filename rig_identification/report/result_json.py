@@ -1,0 +1,95 @@
+"""``result.json`` of the recording contract: strict JSON, null where nothing was determined."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.result import ELEMENTS, Identification, InertialEstimate, Mismatch
+
+#: Index into the ten elements of each entry of the inertia tensor.
+INERTIA_INDEX = ((4, 5, 6), (5, 7, 8), (6, 8, 9))
+
+
+def result_to_dict(identification: Identification) -> dict[str, object]:
+    """Turn an identification into the contract's result.
+
+    Returns
+    -------
+    dict
+        Exactly the contract's keys. Elements named in ``unobservable`` are None, with their standard deviations
+        and their rows and columns of the covariance. ``without_frame`` is None where no frame was described.
+    """
+    total = identification.total
+    without_frame = identification.without_frame
+    return {
+        **_estimate(total),
+        "covariance": _masked(total.covariance, _observable(total)),
+        "without_frame": None if without_frame is None else _estimate(without_frame),
+        "unobservable": list(total.unobservable),
+        "mismatch": _mismatch(identification.mismatch),
+    }
+
+
+def write_result(identification: Identification, path: Path) -> None:
+    """Write :func:`result_to_dict` as strict JSON: no NaN, no infinity."""
+    text = json.dumps(result_to_dict(identification), indent=2, allow_nan=False, ensure_ascii=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _observable(estimate: InertialEstimate) -> NDArray[np.bool_]:
+    return np.array([name not in estimate.unobservable for name in ELEMENTS])
+
+
+def _masked(covariance: NDArray[np.float64], observable: NDArray[np.bool_]) -> object:
+    return _plain(np.where(np.outer(observable, observable), covariance, np.nan))
+
+
+def _estimate(estimate: InertialEstimate) -> dict[str, object]:
+    """Value and standard deviation of mass, centre of mass and inertia tensor."""
+    observable = _observable(estimate)
+    variance = np.diag(estimate.covariance)
+    with np.errstate(invalid="ignore"):  # an unobservable element may have no variance at all
+        columns = {"value": estimate.values, "std": np.sqrt(variance)}
+    masked = {key: _plain(np.where(observable, column, np.nan)) for key, column in columns.items()}
+    return {
+        "mass": {key: column[0] for key, column in masked.items()},
+        "center_of_mass": {key: column[1:4] for key, column in masked.items()},
+        "inertia": {key: [[column[i] for i in row] for row in INERTIA_INDEX] for key, column in masked.items()},
+    }
+
+
+def _mismatch(mismatch: Mismatch) -> dict[str, object]:
+    return {
+        "verdict": mismatch.verdict,
+        "findings": [
+            {
+                "effect": finding.effect,
+                "where": _plain(finding.where),
+                "parameters": _plain(finding.parameters),
+                "evidence": _plain(finding.evidence),
+                "statement": finding.statement,
+            }
+            for finding in mismatch.findings
+        ],
+        "alternatives": _plain(mismatch.alternatives),
+    }
+
+
+def _plain(value: object) -> object:
+    """Plain JSON of numpy values, tuples and mappings; what is not finite becomes None."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value
