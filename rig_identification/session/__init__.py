@@ -1,0 +1,6 @@
+"""Sessions on disk: bags and descriptions in and out."""
+
+from rig_identification.session.read import read_session
+from rig_identification.session.rig_description import read_rig
+
+__all__ = ["read_rig", "read_session"]

@@ -1,0 +1,141 @@
+"""One topic's messages turned into a clean series, with an account of what was left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.errors import InputError
+from rig_identification.recording import ChannelQuality, Series
+from rig_identification.session.bag import RawTopic
+from rig_identification.session.cdr import decode
+from rig_identification.session.clipping import clipped_samples
+from rig_identification.session.stamps import StampSelection, select_stamps
+from rig_identification.session.topics import Topic
+
+_SECOND = 1e9
+#: Columns of the decoded message that a channel uses.
+_COLUMNS = {
+    "tension": [2],
+    "exciter_force": [0, 1, 2],
+    "exciter_shaft": [0, 1],
+    "imu": [0, 1, 2, 3, 4, 5],
+    "inclination": [0, 1],
+    "mocap": list(range(7)),
+    "ground_truth": list(range(13)),
+}
+#: Channels whose sensor has an end of range.
+_CAN_CLIP = ("tension", "exciter_force", "imu", "inclination")
+#: Channels that carry a quaternion in columns 3 to 6.
+_POSES = ("mocap", "ground_truth")
+_GAP = 1.5  # median intervals
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Usable samples of one topic, stamps still in ns, before the recording's start is known."""
+
+    topic: Topic
+    stamp_ns: NDArray[
+        np.int64
+    ]  # (n,) strictly increasing; samples that are not finite or clipped are left out
+    values: NDArray[np.float64]  # (n, width)
+    count: int  # messages in the bag
+    selection: StampSelection
+    ordered_ns: NDArray[np.int64]  # (m,) stamps of all kept messages, whatever their values
+    not_finite: int
+    clipped: int
+    notes: tuple[str, ...]
+
+    def series(self, start_ns: int) -> Series | None:
+        """Samples against seconds after ``start_ns``; None where nothing was measured."""
+        if not len(self.stamp_ns):
+            return None
+        return Series((self.stamp_ns - start_ns) / _SECOND, self.values)
+
+    def quality(self, start_ns: int, *extra_notes: str) -> ChannelQuality:
+        """Account of the topic for the report."""
+        steps = np.diff(self.ordered_ns)
+        median = float(np.median(steps)) if len(steps) else 0.0
+        gaps = steps[steps > _GAP * median]
+        used = self.stamp_ns if len(self.stamp_ns) else self.ordered_ns
+        return ChannelQuality(
+            topic=self.topic.name,
+            count=self.count,
+            used=len(self.stamp_ns),
+            rate=_SECOND / median if median else 0.0,
+            start=float((used[0] - start_ns) / _SECOND),
+            end=float((used[-1] - start_ns) / _SECOND),
+            gaps=len(gaps),
+            missing=int(np.sum(np.round(gaps / median) - 1)) if len(gaps) else 0,
+            longest_gap=float(gaps.max() / _SECOND) if len(gaps) else 0.0,
+            duplicated=self.selection.duplicated,
+            backward=self.selection.backward,
+            not_finite=self.not_finite,
+            clipped=self.clipped,
+            notes=self.selection.notes + self.notes + extra_notes,
+        )
+
+
+def read_channel(raw: RawTopic, topic: Topic, where: str) -> Channel:
+    """Decode and clean one topic; ``where`` is the bag, for messages.
+
+    Raises
+    ------
+    InputError
+        Wrong message type, no message, or no message with a usable stamp.
+    """
+    if raw.message_type != topic.message_type:
+        raise InputError(
+            f"{where}: {topic.name}: type is {raw.message_type}, not {topic.message_type}; "
+            "record the contract's type or map the topic to another"
+        )
+    if raw.count == 0:
+        raise InputError(
+            f"{where}: {topic.name}: topic is empty, 0 messages; record it or leave the topic out of the bag"
+        )
+    try:
+        stamp_ns, decoded = decode(raw)
+    except InputError as err:
+        raise InputError(f"{where}: {err}") from err
+    selection = select_stamps(stamp_ns, raw.received_ns)
+    if not len(selection.kept):
+        raise InputError(
+            f"{where}: {topic.name}: none of {raw.count} stamps is usable; stamp the messages when measured"
+        )
+    return _clean(topic, raw.count, selection, stamp_ns[selection.kept], decoded[selection.kept])
+
+
+def _clean(
+    topic: Topic,
+    count: int,
+    selection: StampSelection,
+    stamp_ns: NDArray[np.int64],
+    decoded: NDArray[np.float64],
+) -> Channel:
+    values = decoded[:, _COLUMNS[topic.channel]]
+    notes: tuple[str, ...] = ()
+    if topic.channel in _POSES:
+        values = _with_unit_quaternions(values)
+    finite = np.isfinite(values).all(axis=1)
+    if not finite.any():
+        notes = ("never a number in every field: taken as not measured",)
+    clipped = np.zeros(len(values), bool)
+    if topic.channel in _CAN_CLIP:
+        clipped[finite] = clipped_samples(values[finite])
+    used = finite & ~clipped
+    return Channel(
+        topic, stamp_ns[used], np.ascontiguousarray(values[used]), count, selection, stamp_ns,
+        int(np.count_nonzero(~finite)), int(np.count_nonzero(clipped)), notes,
+    )  # fmt: skip
+
+
+def _with_unit_quaternions(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions scaled to norm 1; one of norm 0 or far from 1 is no orientation and becomes NaN."""
+    norms = np.linalg.norm(values[:, 3:7], axis=1, keepdims=True)
+    norms[np.abs(norms - 1.0) > 0.1] = np.nan
+    unit = values.copy()
+    unit[:, 3:7] /= norms
+    return unit

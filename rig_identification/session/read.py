@@ -1,0 +1,154 @@
+"""A session on disk to a validated :class:`~rig_identification.recording.Session`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from rig_identification.errors import InputError
+from rig_identification.recording import ChannelQuality, Recording, Series, Session
+from rig_identification.rig import Rig
+from rig_identification.session.bag import Bag, read_bag
+from rig_identification.session.channel import Channel, read_channel
+from rig_identification.session.rest import check_rest
+from rig_identification.session.rig_description import read_rig
+from rig_identification.session.session_description import BagEntry, read_session_description
+from rig_identification.session.topics import DEFAULT_NAMESPACE, Topic, expected_topics, foreign_cable
+
+#: A dynamic run must last this long to tell anything.
+SHORTEST_RUN = 1.0  # s
+#: Clocks of two devices may differ by tolerances, not by this: then one of them was never set.
+_CLOCKS_APART = 60_000_000_000  # ns
+#: Channels that cannot be used without knowing where the device sits.
+_MOUNTED = {"imu": "imu", "inclination": "inclinometer", "exciter_force": "exciter"}
+
+Progress = Callable[[str], None]
+
+
+def read_session(
+    path: str | Path,
+    *,
+    namespace: str = DEFAULT_NAMESPACE,
+    topics: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+) -> Session:
+    """Read a session: description, rig and every bag, validated once.
+
+    Parameters
+    ----------
+    path : str or Path
+        The session's folder or its session.yaml.
+    namespace : str
+        Namespace of the topics.
+    topics : mapping, optional
+        Topics of other names: contract name (``imu/data_raw``) to name in the bag.
+    progress : callable, optional
+        Called with one sentence before each bag is read.
+
+    Raises
+    ------
+    InputError
+        The first thing that cannot be used, as one line: where, what, which value, what to do.
+    """
+    description = read_session_description(Path(path))
+    rig = read_rig(description.rig_file)
+    expected = expected_topics(tuple(cable.name for cable in rig.cables), namespace, topics)
+    recordings = []
+    for entry in description.entries:
+        if progress is not None:
+            progress(f"reading {entry.name}")
+        recordings.append(_read_recording(entry, rig, expected, namespace))
+    name = description.file.resolve().parent.name
+    return Session(name=name, rig=rig, recordings=tuple(recordings))
+
+
+def _read_recording(entry: BagEntry, rig: Rig, expected: dict[str, Topic], namespace: str) -> Recording:
+    bag = read_bag(entry.folder, expected)
+    channels = [
+        read_channel(bag.topics.pop(name), expected[name], str(bag.folder)) for name in list(bag.topics)
+    ]
+    if all(channel.topic.channel == "ground_truth" for channel in channels):
+        known = ", ".join(sorted(bag.listed)) or "none"
+        raise InputError(
+            f"{bag.folder}: no topic of the contract in the bag; it has {known}: map the topics or namespace"
+        )
+    together, apart = _on_one_clock(channels)
+    start_ns = min(int(channel.ordered_ns[0]) for channel in together)
+    duration = (max(int(channel.ordered_ns[-1]) for channel in together) - start_ns) / 1e9
+    reasons = {id(channel): _left_aside(channel, rig, bag) for channel in together}
+    used = [channel for channel in together if reasons[id(channel)] is None]
+    quality = [channel.quality(start_ns, *filter(None, [reasons[id(channel)]])) for channel in together]
+    quality += [
+        channel.quality(start_ns, "stamps are on another clock than the other topics': left aside")
+        for channel in apart
+    ]
+    quality += _foreign(bag, expected, namespace)
+    recording = _recording(entry, start_ns, duration, used, tuple(quality))
+    _check_motion(recording, rig, bag)
+    return recording
+
+
+def _on_one_clock(channels: list[Channel]) -> tuple[list[Channel], list[Channel]]:
+    """Channels whose stamps lie together, by majority, and the others."""
+    middle = np.median(
+        [channel.ordered_ns[len(channel.ordered_ns) // 2] - channels[0].ordered_ns[0] for channel in channels]
+    )
+    middle_ns = int(middle) + int(channels[0].ordered_ns[0])
+    span = max(int(np.ptp(channel.ordered_ns)) for channel in channels)
+    together, apart = [], []
+    for channel in channels:
+        distance = abs(int(channel.ordered_ns[len(channel.ordered_ns) // 2]) - middle_ns)
+        (apart if distance > span + _CLOCKS_APART else together).append(channel)
+    return (together, apart) if together else (apart, [])
+
+
+def _left_aside(channel: Channel, rig: Rig, bag: Bag) -> str | None:
+    """Why a channel cannot be used with this rig description, None where it can."""
+    device = _MOUNTED.get(channel.topic.channel)
+    if device is None or getattr(rig, device) is not None:
+        return None
+    if device == "exciter" and np.any(channel.values):
+        raise InputError(
+            f"{bag.folder}: {channel.topic.name}: a force is recorded but the rig description has no exciter; "
+            "add its position and orientation"
+        )
+    return f"the rig description has no {device}: left aside"
+
+
+def _foreign(bag: Bag, expected: dict[str, Topic], namespace: str) -> list[ChannelQuality]:
+    """Topics of cables that the rig description does not know."""
+    accounts = []
+    for name in bag.listed:
+        cable = foreign_cable(name, namespace)
+        if cable is not None and name not in expected:
+            note = f"{cable} is no cable of the rig description: left aside"
+            accounts.append(ChannelQuality(name, 0, 0, 0.0, 0.0, 0.0, 0, 0, 0.0, 0, 0, 0, 0, (note,)))
+    return accounts
+
+
+def _recording(
+    entry: BagEntry, start_ns: int, duration: float, used: list[Channel], quality: tuple[ChannelQuality, ...]
+) -> Recording:
+    tension: dict[str, Series] = {}
+    others: dict[str, Series | None] = {}
+    for channel in used:
+        series = channel.series(start_ns)
+        if channel.topic.cable is None:
+            others[channel.topic.channel] = series
+        elif series is not None:
+            tension[channel.topic.cable] = series
+    return Recording(
+        name=entry.name, kind=entry.kind, holdout=entry.holdout, start_ns=start_ns, duration=duration,
+        dummy=entry.dummy, tension=tension, quality=quality, **others,
+    )  # fmt: skip
+
+
+def _check_motion(recording: Recording, rig: Rig, bag: Bag) -> None:
+    if recording.kind == "static":
+        check_rest(recording, rig, str(bag.folder))
+    elif recording.duration < SHORTEST_RUN:
+        raise InputError(
+            f"{bag.folder}: dynamic run lasts {recording.duration:.3g} s, less than {SHORTEST_RUN:g} s; record a longer one"
+        )

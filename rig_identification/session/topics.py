@@ -1,0 +1,79 @@
+"""The contract's topics: their names, message types and what a session does with each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rig_identification.errors import InputError
+
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+DEFAULT_NAMESPACE = "/rig"
+
+#: Channels besides the cables: contract name -> (channel, message type).
+FIXED_TOPICS = {
+    "exciter/wrench": ("exciter_force", WRENCH),
+    "exciter/joint_states": ("exciter_shaft", "sensor_msgs/msg/JointState"),
+    "imu/data_raw": ("imu", "sensor_msgs/msg/Imu"),
+    "inclinometer/angles": ("inclination", "geometry_msgs/msg/Vector3Stamped"),
+    "mocap/pose": ("mocap", "geometry_msgs/msg/PoseStamped"),
+    "ground_truth/odometry": ("ground_truth", "nav_msgs/msg/Odometry"),
+}
+
+#: First parts of the fixed topics: no cable may be named so.
+DEVICES = frozenset(name.partition("/")[0] for name in FIXED_TOPICS)
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic that a session looks for in its bags."""
+
+    name: str  # in the bag
+    channel: str  # "tension" or a channel of FIXED_TOPICS
+    message_type: str
+    cable: str | None = None
+
+
+def expected_topics(
+    cables: tuple[str, ...], namespace: str = DEFAULT_NAMESPACE, renamed: Mapping[str, str] | None = None
+) -> dict[str, Topic]:
+    """Topics of a rig by their names in the bag.
+
+    Parameters
+    ----------
+    cables : tuple of str
+        The cables' names.
+    namespace : str
+        What precedes every topic that is not in ``renamed``.
+    renamed : mapping, optional
+        Contract name, with or without ``/rig/`` (``imu/data_raw``), to the name in the bag.
+
+    Raises
+    ------
+    InputError
+        ``renamed`` has a key that is no topic of this rig, or two topics get one name.
+    """
+    prefix = "/" + namespace.strip("/") if namespace.strip("/") else ""
+    contract = {f"{cable}/wrench": ("tension", WRENCH, cable) for cable in cables}
+    contract.update({name: (channel, kind, None) for name, (channel, kind) in FIXED_TOPICS.items()})
+    names = {name: f"{prefix}/{name}" for name in contract}
+    for key, bag_name in (renamed or {}).items():
+        short = key.strip("/").removeprefix(DEFAULT_NAMESPACE.strip("/") + "/")
+        if short not in contract:
+            raise InputError(f"topic mapping: {key} is no topic of this rig; known are {', '.join(contract)}")
+        names[short] = bag_name if bag_name.startswith("/") else f"/{bag_name}"
+    topics = {names[name]: Topic(names[name], *contract[name]) for name in contract}
+    if len(topics) < len(contract):
+        raise InputError(
+            "topic mapping: two topics of the rig are mapped to one topic of the bag; map each to its own"
+        )
+    return topics
+
+
+def foreign_cable(name: str, namespace: str = DEFAULT_NAMESPACE) -> str | None:
+    """Cable that topic ``name`` would belong to by its form ``<namespace>/<cable>/wrench``, else None."""
+    prefix = "/" + namespace.strip("/") if namespace.strip("/") else ""
+    parts = name.removeprefix(prefix).strip("/").split("/")
+    if name.startswith(prefix) and len(parts) == 2 and parts[1] == "wrench" and parts[0] not in DEVICES:
+        return parts[0]
+    return None
