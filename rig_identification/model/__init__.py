@@ -1,0 +1,1 @@
+"""Forward model: one set of equations for simulator and estimator."""

@@ -1,0 +1,400 @@
+"""Motion and its exact derivatives: Runge-Kutta of fourth order on the rotation group.
+
+Each step integrates the local state of dynamics.py from a fresh reference rotation
+(Munthe-Kaas, "High order Runge-Kutta methods on manifolds", 1999), goes back to the cable
+lengths, and carries sensitivity columns through the same four stages. Columns are kept
+per node interval as
+    x_{k+1} = A_k x_k + B_k w_k + C_k p        (first-order, about the motion)
+with w a wrench held over the interval and p the chosen entries of ``physics``, so that
+filters (noise that enters as force) and parameter derivatives share one pass.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from rig_identification.model.arithmetic import STEP, eliminate, invert
+from rig_identification.model.constraints import (
+    cable_length_and_rate,
+    project_columns,
+    project_state,
+    update_reference,
+)
+from rig_identification.model.dynamics import assemble, rotation, rotation_rate
+from rig_identification.model.layout import (
+    CABLE_SIZE,
+    CABLES,
+    GRAVITY,
+    LENGTH,
+    OUT_ANGULAR_ACCELERATION,
+    OUT_POSITION,
+    OUT_RATE,
+    OUT_ROTATION,
+    OUT_SPECIFIC_FORCE,
+    OUT_TENSION,
+    RATE,
+    RIGID,
+    ROTATION,
+    SLACK,
+    VELOCITY,
+)
+
+EXCITER_CLOCK = -1  # direction: the exciter's stamps are late by this (s)
+WRENCH = 6
+
+
+@njit(cache=True, nogil=True)
+def solve(physics, modes, mount, x, R, force, wrench, K, r, inverse, z):  # type: ignore[no-untyped-def]
+    """z = K^-1 r; returns False where the rig is singular. ``inverse`` keeps K^-1 where it has room for it."""
+    assemble(physics, modes, mount, x, R, force, wrench, K, r)
+    if inverse.shape[0] == 0:
+        z[:] = r
+        return eliminate(K, z)
+    if not invert(K, inverse):
+        return False
+    size = r.shape[0]
+    for i in range(size):
+        total = 0.0
+        for j in range(size):
+            total += inverse[i, j] * r[j]
+        z[i] = total
+    return True
+
+
+@njit(cache=True, nogil=True)
+def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z, inverse, directions, out):  # type: ignore[no-untyped-def]
+    """out (6 + n, 12 + 6 + len(directions)) = dz in state, wrench and physics, by complex step."""
+    size = z.shape[0]
+    xc = x.astype(np.complex128)
+    pc = physics.astype(np.complex128)
+    fc = force.astype(np.complex128)
+    wc = wrench.astype(np.complex128)
+    Rc = np.empty((3, 3), dtype=np.complex128)
+    Kc = np.empty((size, size), dtype=np.complex128)
+    rc = np.empty(size, dtype=np.complex128)
+    change = np.empty(size)
+    first = 12 + WRENCH
+    for column in range(12 + directions.shape[0]):
+        target = column if column < 12 else column + WRENCH
+        if column < 12:
+            xc[column] = complex(x[column], STEP)
+        else:
+            d = directions[column - 12]
+            if d == EXCITER_CLOCK:
+                for i in range(3):
+                    fc[i] = complex(force[i], STEP * force_rate[i])
+            else:
+                pc[d] = complex(physics[d], STEP)
+        rotation(reference, xc, Rc)
+        assemble(pc, modes, mount, xc, Rc, fc, wc, Kc, rc)
+        for i in range(size):
+            total = rc[i].imag
+            for j in range(size):
+                total -= Kc[i, j].imag * z[j]
+            change[i] = total / STEP
+        for i in range(size):
+            total = 0.0
+            for j in range(size):
+                total += inverse[i, j] * change[j]
+            out[i, target] = total
+        if column < 12:
+            xc[column] = x[column]
+        elif directions[column - 12] == EXCITER_CLOCK:
+            for i in range(3):
+                fc[i] = force[i]
+        else:
+            pc[directions[column - 12]] = physics[directions[column - 12]]
+    for i in range(size):
+        for j in range(WRENCH):
+            out[i, first - WRENCH + j] = inverse[i, j]
+
+
+@njit(cache=True, nogil=True)
+def _stage_columns(x, R, z, dz, columns, slopes):  # type: ignore[no-untyped-def]
+    """slopes (12, m) = d(dx/dt) for stage columns (12, m): state, wrench, physics blocks."""
+    m = columns.shape[1]
+    # z responds to the state through dz's first 12 columns, and directly to wrench and physics
+    for c in range(m):
+        for i in range(3):
+            slopes[i, c] = columns[VELOCITY + i, c]
+    response = np.zeros((6, m))
+    for i in range(6):
+        for d in range(12):
+            g = dz[i, d]
+            if g != 0.0:
+                for c in range(m):
+                    response[i, c] += g * columns[d, c]
+        for c in range(12, m):
+            response[i, c] += dz[i, c]
+    # dv/dt = R A: change of A, and of R: R (dtheta x A), dtheta = J_r(phi) dphi ~ dphi - phi x dphi / 2
+    p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
+    w0, w1, w2 = x[RATE], x[RATE + 1], x[RATE + 2]
+    t = p0 * p0 + p1 * p1 + p2 * p2
+    c2 = 0.5 - t / 24.0
+    c3 = 1.0 / 6.0 - t / 120.0
+    k = 1.0 / 12.0 + t / 720.0
+    for c in range(m):
+        f0, f1, f2 = columns[ROTATION, c], columns[ROTATION + 1, c], columns[ROTATION + 2, c]
+        q0 = p1 * f2 - p2 * f1
+        q1 = p2 * f0 - p0 * f2
+        q2 = p0 * f1 - p1 * f0
+        t0 = f0 - c2 * q0 + c3 * (p1 * q2 - p2 * q1)
+        t1 = f1 - c2 * q1 + c3 * (p2 * q0 - p0 * q2)
+        t2 = f2 - c2 * q2 + c3 * (p0 * q1 - p1 * q0)
+        r0 = response[0, c] + t1 * z[2] - t2 * z[1]
+        r1 = response[1, c] + t2 * z[0] - t0 * z[2]
+        r2 = response[2, c] + t0 * z[1] - t1 * z[0]
+        for i in range(3):
+            slopes[VELOCITY + i, c] = R[i, 0] * r0 + R[i, 1] * r1 + R[i, 2] * r2
+            slopes[RATE + i, c] = response[3 + i, c]
+        # dphi/dt = w + phi x w / 2 + k phi x (phi x w)
+        g0, g1, g2 = columns[RATE, c], columns[RATE + 1, c], columns[RATE + 2, c]
+        s0 = p1 * w2 - p2 * w1
+        s1 = p2 * w0 - p0 * w2
+        s2 = p0 * w1 - p1 * w0
+        d0 = f1 * w2 - f2 * w1 + p1 * g2 - p2 * g1
+        d1 = f2 * w0 - f0 * w2 + p2 * g0 - p0 * g2
+        d2 = f0 * w1 - f1 * w0 + p0 * g1 - p1 * g0
+        dk = (p0 * f0 + p1 * f1 + p2 * f2) / 360.0
+        slopes[ROTATION, c] = (
+            g0 + 0.5 * d0 + k * (f1 * s2 - f2 * s1 + p1 * d2 - p2 * d1) + dk * (p1 * s2 - p2 * s1)
+        )
+        slopes[ROTATION + 1, c] = (
+            g1 + 0.5 * d1 + k * (f2 * s0 - f0 * s2 + p2 * d0 - p0 * d2) + dk * (p2 * s0 - p0 * s2)
+        )
+        slopes[ROTATION + 2, c] = (
+            g2 + 0.5 * d2 + k * (f0 * s1 - f1 * s0 + p0 * d1 - p1 * d0) + dk * (p0 * s1 - p1 * s0)
+        )
+
+
+@njit(cache=True, nogil=True)
+def _absorb_rotation_columns(x, columns):  # type: ignore[no-untyped-def]
+    """Turn columns of phi into columns of the right rotation increment of R_ref Exp(phi)."""
+    p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
+    t = p0 * p0 + p1 * p1 + p2 * p2
+    c2 = 0.5 - t / 24.0
+    c3 = 1.0 / 6.0 - t / 120.0
+    for c in range(columns.shape[1]):
+        f0, f1, f2 = columns[ROTATION, c], columns[ROTATION + 1, c], columns[ROTATION + 2, c]
+        q0 = p1 * f2 - p2 * f1
+        q1 = p2 * f0 - p0 * f2
+        q2 = p0 * f1 - p1 * f0
+        columns[ROTATION, c] = f0 - c2 * q0 + c3 * (p1 * q2 - p2 * q1)
+        columns[ROTATION + 1, c] = f1 - c2 * q1 + c3 * (p2 * q0 - p0 * q2)
+        columns[ROTATION + 2, c] = f2 - c2 * q2 + c3 * (p0 * q1 - p1 * q0)
+
+
+@njit(cache=True, nogil=True)
+def _write_outputs(physics, R, x, z, out):  # type: ignore[no-untyped-def]
+    n = z.shape[0] - 6
+    for i in range(3):
+        out[OUT_POSITION + i] = x[i]
+        out[OUT_ROTATION + i] = 0.0
+        out[OUT_RATE + i] = x[RATE + i]
+        out[OUT_ANGULAR_ACCELERATION + i] = z[3 + i]
+        weight = 0.0
+        for j in range(3):
+            weight += R[j, i] * physics[GRAVITY + j]
+        out[OUT_SPECIFIC_FORCE + i] = z[i] - weight
+    for i in range(n):
+        out[OUT_TENSION + i] = z[6 + i]
+
+
+@njit(cache=True, nogil=True)
+def _write_output_columns(physics, R, dz, directions, out):  # type: ignore[no-untyped-def]
+    """out (15 + n, 18 + len(directions)): derivative of raw outputs in state, wrench, physics."""
+    n = dz.shape[0] - 6
+    m = dz.shape[1]
+    for i in range(15):
+        for c in range(m):
+            out[i, c] = 0.0
+    g = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            g[i] += R[j, i] * physics[GRAVITY + j]
+    for i in range(3):
+        out[OUT_POSITION + i, i] = 1.0
+        out[OUT_ROTATION + i, ROTATION + i] = 1.0
+        out[OUT_RATE + i, RATE + i] = 1.0
+        for c in range(m):
+            out[OUT_SPECIFIC_FORCE + i, c] = dz[i, c]
+            out[OUT_ANGULAR_ACCELERATION + i, c] = dz[3 + i, c]
+    # d(R^T g) = (R^T g) x dtheta, and R^T dg; specific force takes them with a minus
+    out[OUT_SPECIFIC_FORCE, ROTATION + 1] += g[2]
+    out[OUT_SPECIFIC_FORCE, ROTATION + 2] -= g[1]
+    out[OUT_SPECIFIC_FORCE + 1, ROTATION] -= g[2]
+    out[OUT_SPECIFIC_FORCE + 1, ROTATION + 2] += g[0]
+    out[OUT_SPECIFIC_FORCE + 2, ROTATION] += g[1]
+    out[OUT_SPECIFIC_FORCE + 2, ROTATION + 1] -= g[0]
+    for k in range(directions.shape[0]):
+        d = directions[k]
+        if GRAVITY <= d < GRAVITY + 3:
+            for i in range(3):
+                out[OUT_SPECIFIC_FORCE + i, 12 + WRENCH + k] -= R[d - GRAVITY, i]
+    for i in range(n):
+        for c in range(m):
+            out[OUT_TENSION + i, c] = dz[6 + i, c]
+
+
+@njit(cache=True, nogil=True)
+def _switch_cables(physics, modes, x, reference, z, can_slacken):  # type: ignore[no-untyped-def]
+    """Let go cables that would push, catch those that came tight; returns True on a change."""
+    changed = False
+    for i in range(modes.shape[0]):
+        if not can_slacken[i]:
+            continue
+        if modes[i] == RIGID and z[6 + i] < 0.0:
+            modes[i] = SLACK
+            changed = True
+        elif modes[i] == SLACK:
+            o = CABLES + CABLE_SIZE * i
+            gradient = np.empty(6)
+            length, rate = cable_length_and_rate(physics, o, x, reference, gradient)
+            if length > physics[o + LENGTH] and rate > 0.0:
+                modes[i] = RIGID
+                changed = True
+    return changed
+
+
+
+@njit(cache=True, nogil=True)
+def propagate(  # type: ignore[no-untyped-def]
+    physics,
+    modes,
+    can_slacken,
+    mount,
+    x,
+    reference,
+    forces,
+    force_rates,
+    wrenches,
+    step,
+    substeps,
+    directions,
+    start_columns,
+    sensitivity,
+    nodes_x,
+    nodes_R,
+    nodes_out,
+    A,
+    B,
+    H,
+    D,
+    J,
+):
+    """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N where all went well).
+
+    x (12,) and reference (3, 3): start, destroyed. forces, force_rates (N, 3): exciter force
+    in its frame and its rate at the nodes, linear between. wrenches (N, 6): further wrench,
+    body axes, held over the interval. directions (d,): entries of ``physics`` to
+    differentiate in (EXCITER_CLOCK: clock). start_columns (12, s + d): derivative of the
+    start state in s start coordinates and the d directions.
+    Filled: nodes_x (N, 12), nodes_R (N, 3, 3), nodes_out (N, 15 + n); and where
+    ``sensitivity``: A (N, 12, 12), B (N, 12, 6), H (N, 15 + n, 12), D (N, 15 + n, 6), and
+    J (N, 15 + n, s + d), total derivatives of the raw outputs.
+    """
+    nodes = forces.shape[0]
+    n = modes.shape[0]
+    size = 6 + n
+    d = directions.shape[0]
+    local = 12 + WRENCH + d
+    starts = start_columns.shape[1] - d
+    K = np.empty((size, size))
+    r = np.empty(size)
+    inverse = np.empty((size if sensitivity else 0, size))
+    z = np.empty(size)
+    R = np.empty((3, 3))
+    k = np.empty((4, 12))
+    y = np.empty(12)
+    phi_rate = np.empty(3)
+    force = np.empty(3)
+    rate = np.empty(3)
+    h = step / substeps
+    weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
+    ahead = np.array([0.0, 0.5, 0.5, 1.0])
+    dz = np.empty((size, local if sensitivity else 0))
+    columns = np.zeros((12, local if sensitivity else 0))
+    stage = np.zeros((12, local if sensitivity else 0))
+    slopes = np.empty((4, 12, local if sensitivity else 0))
+    out_columns = np.empty((15 + n, local if sensitivity else 0))
+    S = start_columns.copy()
+    for node in range(nodes):
+        last = node == nodes - 1
+        wrench = wrenches[node]
+        if sensitivity:
+            columns[:, :] = 0.0
+            for i in range(12):
+                columns[i, i] = 1.0
+        for sub in range(1 if last else substeps):
+            for s in range(4):
+                for i in range(12):
+                    y[i] = x[i] + (h * ahead[s] * k[s - 1, i] if s > 0 else 0.0)
+                at = (sub + ahead[s]) / substeps
+                for i in range(3):
+                    after = forces[node, i] if last else forces[node + 1, i]
+                    force[i] = forces[node, i] + at * (after - forces[node, i])
+                    rate[i] = force_rates[node, i]
+                rotation(reference, y, R)
+                if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
+                    return node
+                if s == 0 and _switch_cables(physics, modes, y, reference, z, can_slacken):
+                    project_state(physics, modes, x, reference)
+                    y[:] = x
+                    rotation(reference, y, R)
+                    if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
+                        return node
+                if sensitivity:
+                    linearise(
+                        physics, modes, mount, reference, y, force, rate, wrench, z, inverse, directions, dz
+                    )
+                if s == 0 and sub == 0:
+                    nodes_x[node] = y
+                    nodes_R[node] = R
+                    _write_outputs(physics, R, y, z, nodes_out[node])
+                    if sensitivity:
+                        _write_output_columns(physics, R, dz, directions, out_columns)
+                        H[node] = out_columns[:, :12]
+                        D[node] = out_columns[:, 12 : 12 + WRENCH]
+                        total = np.dot(np.ascontiguousarray(out_columns[:, :12]), S)
+                        total[:, starts:] += out_columns[:, 12 + WRENCH :]
+                        J[node] = total
+                    if last:
+                        return nodes
+                rotation_rate(y, phi_rate)
+                for i in range(3):
+                    k[s, i] = y[VELOCITY + i]
+                    k[s, ROTATION + i] = phi_rate[i]
+                    k[s, VELOCITY + i] = R[i, 0] * z[0] + R[i, 1] * z[1] + R[i, 2] * z[2]
+                    k[s, RATE + i] = z[3 + i]
+                if sensitivity:
+                    if s == 0:
+                        stage[:, :] = columns
+                    else:
+                        for i in range(12):
+                            for c in range(local):
+                                stage[i, c] = columns[i, c] + h * ahead[s] * slopes[s - 1, i, c]
+                    _stage_columns(y, R, z, dz, stage, slopes[s])
+            for i in range(12):
+                total_rate = 0.0
+                for s in range(4):
+                    total_rate += weights[s] * k[s, i]
+                x[i] += h * total_rate
+                if not abs(x[i]) < 1e6:
+                    return node
+            if sensitivity:
+                for s in range(4):
+                    for i in range(12):
+                        for c in range(local):
+                            columns[i, c] += h * weights[s] * slopes[s, i, c]
+                _absorb_rotation_columns(x, columns)
+            update_reference(reference, x)
+            project_state(physics, modes, x, reference)
+            if sensitivity:
+                project_columns(physics, modes, x, reference, directions, 12 + WRENCH, columns)
+        if sensitivity:
+            A[node] = columns[:, :12]
+            B[node] = columns[:, 12 : 12 + WRENCH]
+            S = np.dot(np.ascontiguousarray(columns[:, :12]), S)
+            S[:, starts:] += columns[:, 12 + WRENCH :]
+    return nodes

@@ -1,0 +1,53 @@
+"""Where each physical quantity stands in the forward model's flat arrays.
+
+One array ``physics`` holds every number that the motion depends on; the blocks are
+gravity, the ten inertial parameters, the exciter, one block a cable, one block an effect.
+The inertial block is the one in which the Newton-Euler equations are linear: mass, first
+moment m c, and the inertia about the body datum (not about the centre of mass).
+"""
+
+from __future__ import annotations
+
+GRAVITY = 0  # 3: acceleration of gravity in world, m/s^2
+INERTIAL = 3  # 10: m, m cx, m cy, m cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the datum
+EXCITER_POSITION = 13  # 3: m, body
+EXCITER_ROTATION = 16  # 3: rotation vector of exciter frame against its description, rad, body axes
+EXCITER_GAIN = 19  # 1: factor from measured to true force
+CABLES = 20  # first cable block
+CABLE_SIZE = 9
+CEILING_POINT = 0  # 3: m, world
+BODY_POINT = 3  # 3: m, body
+LENGTH = 6  # m
+AXIAL_STIFFNESS = 7  # EA, N
+AXIAL_DAMPING = 8  # time constant tau of Kelvin-Voigt damping, s
+
+# Local state of the body: see dynamics.py
+POSITION = 0
+ROTATION = 3
+VELOCITY = 6
+RATE = 9
+BODY_STATE = 12
+
+# What a cable does at the moment
+RIGID = 0  # length kept; where cables only pull, it turns SLACK when its tension would be negative
+ELASTIC = 1  # stretches; pulls only
+ELASTIC_ROD = 2  # stretches; pulls and pushes
+SLACK = 3  # no tension
+
+# Raw outputs of a node: see integrate.py
+OUT_POSITION = 0  # 3: datum in world, m
+OUT_ROTATION = 3  # 3: (derivatives only) right-hand rotation increment, rad, body axes
+OUT_RATE = 6  # 3: rad/s, body axes
+OUT_SPECIFIC_FORCE = 9  # 3: acceleration of the datum less gravity, body axes, m/s^2
+OUT_ANGULAR_ACCELERATION = 12  # 3: rad/s^2, body axes
+OUT_TENSION = 15  # n: N
+
+
+def cable_offset(index: int) -> int:
+    """First entry of cable ``index`` in ``physics``."""
+    return CABLES + CABLE_SIZE * index
+
+
+def physics_size(cables: int) -> int:
+    """Length of ``physics`` without effects."""
+    return CABLES + CABLE_SIZE * cables

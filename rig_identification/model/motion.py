@@ -1,0 +1,217 @@
+"""The forward model as a person calls it: a rig, a start, an input; out come motion and derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rig_identification.model import layout
+from rig_identification.model.body import linear_from_elements
+from rig_identification.model.constraints import project_columns, project_state
+from rig_identification.model.integrate import propagate
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RigModel:
+    """Numbers that the motion depends on (layout.py), and what each cable is."""
+
+    physics: Array  # (P,)
+    modes: NDArray[np.int64]  # (n,) RIGID, ELASTIC, ELASTIC_ROD or SLACK at the start
+    can_slacken: NDArray[np.bool_]  # (n,) rigid cables that let go instead of pushing
+    exciter_orientation: Array  # (3, 3) rotates exciter-frame vectors into body
+
+    @property
+    def cables(self) -> int:
+        """Number of cables."""
+        return int(self.modes.size)
+
+    def with_physics(self, physics: Array) -> RigModel:
+        """The same rig with other numbers."""
+        return replace(self, physics=np.ascontiguousarray(physics, dtype=float))
+
+
+def rig_model(rig: Rig, elements: Array, *, axial_stiffness: float | None = None, rods: bool = False) -> RigModel:
+    """Forward model of a described rig carrying a body.
+
+    elements (10,): m, c, J about the centre of mass (see body.py). axial_stiffness: EA in N;
+    None: inextensible. rods: cables may push as well (the thesis' rods).
+    """
+    n = len(rig.cables)
+    physics = np.zeros(layout.physics_size(n))
+    physics[layout.GRAVITY : layout.GRAVITY + 3] = (0.0, 0.0, -rig.gravity)
+    physics[layout.INERTIAL : layout.INERTIAL + 10] = linear_from_elements(np.asarray(elements, dtype=float))
+    physics[layout.EXCITER_GAIN] = 1.0
+    orientation = np.eye(3)
+    if rig.exciter is not None:
+        physics[layout.EXCITER_POSITION : layout.EXCITER_POSITION + 3] = rig.exciter.position
+        orientation = Rotation.from_quat(rig.exciter.orientation).as_matrix()
+    for i, cable in enumerate(rig.cables):
+        o = layout.cable_offset(i)
+        physics[o + layout.CEILING_POINT : o + layout.CEILING_POINT + 3] = cable.ceiling_point
+        physics[o + layout.BODY_POINT : o + layout.BODY_POINT + 3] = cable.body_point
+        physics[o + layout.LENGTH] = cable.length
+        physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
+    elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
+    mode = layout.RIGID if axial_stiffness is None else elastic
+    return RigModel(
+        physics=physics,
+        modes=np.full(n, mode, dtype=np.int64),
+        can_slacken=np.full(n, mode == layout.RIGID and not rods),
+        exciter_orientation=np.ascontiguousarray(orientation),
+    )
+
+
+@dataclass(frozen=True)
+class State:
+    """Pose and velocity of the body datum."""
+
+    position: Array  # (3,) m, world
+    R_world_body: Array  # (3, 3)
+    velocity: Array  # (3,) m/s, world
+    rate: Array  # (3,) rad/s, body axes
+
+    def vector(self) -> Array:
+        """(12,) local state with zero rotation increment."""
+        return np.concatenate([self.position, np.zeros(3), self.velocity, self.rate])
+
+    def moved(self, increment: Array) -> State:
+        """State displaced by (12,): position (world), rotation (body, right), velocity, rate."""
+        return State(
+            position=self.position + increment[:3],
+            R_world_body=self.R_world_body @ Rotation.from_rotvec(increment[3:6]).as_matrix(),
+            velocity=self.velocity + increment[6:9],
+            rate=self.rate + increment[9:12],
+        )
+
+
+def state_from_vector(x: Array, R: Array) -> State:
+    """Inverse of :meth:`State.vector`."""
+    return State(x[:3].copy(), np.array(R), x[6:9].copy(), x[9:12].copy())
+
+
+def on_cables(model: RigModel, state: State) -> State:
+    """The nearest state at which every rigid cable has its length and keeps it."""
+    x, R = state.vector(), np.array(state.R_world_body, order="C")
+    project_state(model.physics, model.modes, x, R)
+    return state_from_vector(x, R)
+
+
+@dataclass(frozen=True)
+class Input:
+    """What drives the body, at equidistant nodes."""
+
+    step: float  # s between nodes
+    force: Array  # (N, 3) exciter force, exciter frame, N, linear between nodes
+    force_rate: Array  # (N, 3) N/s
+    wrench: Array  # (N, 6) further force and moment about the datum, body axes, held over each interval
+
+    @staticmethod
+    def none(nodes: int, step: float) -> Input:
+        """Free motion."""
+        return Input(step, np.zeros((nodes, 3)), np.zeros((nodes, 3)), np.zeros((nodes, 6)))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion at the nodes; derivatives where they were asked for.
+
+    ``outputs`` (N, 15 + n): see the OUT_ entries of layout.py. A, B, H, D, J: see integrate.py.
+    """
+
+    step: float
+    states: Array  # (N, 12)
+    R_world_body: Array  # (N, 3, 3)
+    outputs: Array  # (N, 15 + n)
+    nodes: int  # nodes reached: fewer than asked where the motion left every bound
+    A: Array | None = None
+    B: Array | None = None
+    H: Array | None = None
+    D: Array | None = None
+    J: Array | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether every node was reached."""
+        return self.nodes == self.states.shape[0]
+
+    def state(self, node: int) -> State:
+        """State at one node."""
+        return state_from_vector(self.states[node], self.R_world_body[node])
+
+
+def substeps_for(model: RigModel, step: float) -> int:
+    """Substeps that keep the stiffest elastic mode resolved: omega h <= 0.5."""
+    elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
+    if not np.any(elastic):
+        return 1
+    stiffness = 0.0
+    for i in np.flatnonzero(elastic):
+        o = layout.cable_offset(int(i))
+        stiffness += model.physics[o + layout.AXIAL_STIFFNESS] / model.physics[o + layout.LENGTH]
+    # Pitch and roll on the cables run faster than bounce by at most arm over gyration radius, about 2
+    omega = 2.0 * np.sqrt(stiffness / model.physics[layout.INERTIAL])
+    return max(1, int(np.ceil(step * omega / 0.5)))
+
+
+def simulate(
+    model: RigModel,
+    start: State,
+    drive: Input,
+    *,
+    directions: NDArray[np.int64] | None = None,
+    start_basis: Array | None = None,
+    substeps: int | None = None,
+) -> Motion:
+    """Motion from ``start`` under ``drive``; with derivatives where ``directions`` is given.
+
+    directions (d,): entries of ``model.physics`` (or EXCITER_CLOCK). start_basis (12, s):
+    directions of the start state, each a column; the start follows the cables where a
+    direction of ``physics`` moves them. The start itself is put on the cables first.
+    """
+    sensitivity = directions is not None
+    chosen = np.zeros(0, dtype=np.int64) if directions is None else np.asarray(directions, dtype=np.int64)
+    basis = np.zeros((12, 0)) if start_basis is None else start_basis
+    x, R = start.vector(), np.array(start.R_world_body, order="C")
+    project_state(model.physics, model.modes, x, R)
+    columns = np.zeros((12, basis.shape[1] + chosen.size))
+    columns[:, : basis.shape[1]] = basis
+    project_columns(model.physics, model.modes, x, R, chosen, basis.shape[1], columns)
+    nodes, outputs = drive.force.shape[0], 15 + model.cables
+    kept = nodes if sensitivity else 0
+    states, rotations = np.zeros((nodes, 12)), np.zeros((nodes, 3, 3))
+    out = np.zeros((nodes, outputs))
+    A, B = np.zeros((kept, 12, 12)), np.zeros((kept, 12, 6))
+    H, D = np.zeros((kept, outputs, 12)), np.zeros((kept, outputs, 6))
+    J = np.zeros((kept, outputs, columns.shape[1]))
+    done = propagate(
+        model.physics,
+        model.modes.copy(),
+        model.can_slacken,
+        model.exciter_orientation,
+        x,
+        R,
+        np.ascontiguousarray(drive.force),
+        np.ascontiguousarray(drive.force_rate),
+        np.ascontiguousarray(drive.wrench),
+        drive.step,
+        substeps or substeps_for(model, drive.step),
+        chosen,
+        columns,
+        sensitivity,
+        states,
+        rotations,
+        out,
+        A,
+        B,
+        H,
+        D,
+        J,
+    )
+    derivatives = (A, B, H, D, J) if sensitivity else (None,) * 5
+    return Motion(drive.step, states, rotations, out, int(done), *derivatives)
