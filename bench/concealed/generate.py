@@ -1,0 +1,117 @@
+"""One concealed session from a seed: in memory, or as a folder of bags with its truth beside it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.concealed import truth as truths
+from bench.concealed.draw import draw_scene, gentler
+from bench.concealed.effects import draw_effects
+from bench.concealed.effects.base import Effect
+from bench.concealed.engine import Engine, Trajectory
+from bench.concealed.measure import device_samples, record
+from bench.concealed.scene import Scene
+from rig_identification.recording import Session
+
+LEAST_TENSION = 0.02  # of the weight: clean scenes stay clear of slack cables by this
+MOST_RATE = 0.8  # rad/s
+
+
+def make_session(
+    seed: int, *, kind: str = "random", size: float | None = None, duration: float = 32.0
+) -> tuple[Session, dict[str, Any]]:
+    """A session and its truth.
+
+    ``kind``: "clean", the name of an effect (two joined by "+": a pair), or "random".
+    ``size``: 0 (faint) to 1 (strong); None draws it. ``duration`` of each run in s.
+    The same arguments give the same session, bit for bit, on the same machine.
+    """
+    ideal = draw_scene(seed, duration)
+    for _ in range(6):
+        paths = simulate(ideal, [])
+        if all(map(_calm, [ideal] * len(paths), paths)):
+            break
+        ideal = gentler(ideal)
+    else:
+        raise RuntimeError(f"seed {seed}: no calm enough motion found")
+    effects = draw_effects(np.random.default_rng([seed, 3]), ideal, kind, size)
+    scene = ideal
+    for effect in effects:
+        scene = effect.alter(scene)
+    altered = simulate(scene, effects) if any(e.mechanical for e in effects) else paths
+    with_shaft = bool(np.random.default_rng([seed, 4]).random() < 0.5)
+    recordings = tuple(
+        record(path, scene, effects, plan, k, with_shaft)
+        for k, (path, plan) in enumerate(zip(altered, scene.plans, strict=True))
+    )
+    session = Session(f"concealed_{seed}", scene.rig, recordings)
+    truth = truths.describe(scene, effects, altered)
+    truth["effect_over_noise"] = effect_over_noise(ideal, paths, scene, altered, effects)
+    return session, truth
+
+
+def simulate(scene: Scene, effects: Sequence[Effect]) -> list[Trajectory]:
+    """True motion of every recording of the scene."""
+    paths = []
+    for plan in scene.plans:
+        engine = Engine(scene, effects, plan)
+        residual = engine.release()
+        if not residual < 1e-6:
+            raise RuntimeError(f"seed {scene.seed}, {plan.name}: start not found, residual {residual:.2g}")
+        paths.append(engine.run() if plan.kind == "dynamic" else engine.stand())
+    return paths
+
+
+def effect_over_noise(
+    ideal: Scene,
+    ideal_paths: Sequence[Trajectory],
+    scene: Scene,
+    paths: Sequence[Trajectory],
+    effects: Sequence[Effect],
+) -> dict[str, dict[str, float]]:
+    """By recording and channel: root mean square of what the effects change, in units of one sample's noise."""
+    if not effects:
+        return {}
+    out = {}
+    for k, plan in enumerate(scene.plans):
+        clean = device_samples(ideal_paths[k], ideal, [], ideal.plans[k], k, noise=0.0)
+        other = device_samples(paths[k], scene, effects, plan, k, noise=0.0)
+        out[plan.name] = truths.channel_differences(clean, other, scene)
+    return out
+
+
+def _calm(scene: Scene, path: Trajectory) -> bool:
+    weight = scene.body.mass * scene.rig.gravity
+    return bool(path.tension.min() > LEAST_TENSION * weight and np.abs(path.rate).max() < MOST_RATE)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line: write one session and its truth.json."""
+    parser = argparse.ArgumentParser(prog="python -m bench.concealed.generate", description=__doc__)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--effect", default="random", help="clean, random, an effect's name, or NAME+NAME")
+    parser.add_argument("--size", type=float, default=None, help="0 (faint) to 1 (strong)")
+    parser.add_argument("--duration", type=float, default=32.0, help="of each run, s")
+    parser.add_argument("--storage", default="mcap", choices=["mcap", "sqlite3"])
+    parser.add_argument("--compression", default=None, help="none, message or file")
+    parser.add_argument("--out", type=Path, required=True)
+    options = parser.parse_args(arguments)
+    # Imported here: sessions in memory need no bag writer.
+    from rig_identification.session import write_session
+
+    session, truth = make_session(
+        options.seed, kind=options.effect, size=options.size, duration=options.duration
+    )
+    write_session(session, options.out, storage=options.storage, compression=options.compression)
+    (options.out / "truth.json").write_text(json.dumps(truth, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
