@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LEFT, RIGHT = 56, 8  # px beside the plot, for tick labels
+LEFT, RIGHT = 56, 16  # px beside the plot, for tick labels
+HEAD, FOOT = 17, 22  # px above each panel, for its label, and below the last, for the x axis
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def ticks(lower: float, upper: float, count: int) -> list[float]:
         return []
     raw = span / max(count, 1)
     power = 10.0 ** np.floor(np.log10(raw))
-    step = power * next(m for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * (1.0 - 1e-9))
+    step = power * next(m for m in (1.0, 2.0, 5.0, 10.0) if m * power >= 0.7 * raw)
     first = np.ceil(lower / step - 1e-9)
     last = np.floor(upper / step + 1e-9)
     return [float(k * step) for k in np.arange(first, last + 1)]
@@ -82,9 +83,7 @@ def path_data(x: Array, y: Array) -> str:
 
 def _joined(moves: NDArray[np.int_]) -> list[tuple[str, int]]:
     """Horizontal moves as text, with a separator before all but the first and the negative ones."""
-    return [
-        (f" {dx}" if k and dx >= 0 else str(dx), int(dy)) for k, (dx, dy) in enumerate(moves.tolist())
-    ]
+    return [(f" {dx}" if k and dx >= 0 else str(dx), int(dy)) for k, (dx, dy) in enumerate(moves.tolist())]
 
 
 def chart_svg(
@@ -109,14 +108,14 @@ def chart_svg(
     x_log : bool
         x to the base ten.
     """
-    gap, bottom, top = 10, 30, 6
-    total = sum(p.height for p in panels) + gap * (len(panels) - 1) + bottom + top
+    heads = [HEAD if p.label else HEAD // 3 for p in panels]
+    total = sum(p.height for p in panels) + sum(heads) + FOOT
     parts = [f'<svg class="chart" viewBox="0 0 {width} {total}" role="img"><title>{title}</title>']
-    y = top
-    for panel in panels:
-        parts.append(_panel_svg(panel, x_limits, width, y, x_log))
-        y += panel.height + gap
-    parts.append(_x_axis_svg(x_limits, x_label, width, y - gap, x_log))
+    y = 0
+    for panel, head in zip(panels, heads, strict=True):
+        parts.append(_panel_svg(panel, x_limits, width, y + head, x_log))
+        y += panel.height + head
+    parts.append(_x_axis_svg(x_limits, x_label, width, y, x_log))
     return "".join(parts) + "</svg>"
 
 
@@ -148,17 +147,21 @@ def _panel_svg(panel: Panel, x_limits: tuple[float, float], width: int, top: int
     parts = [f'<g transform="translate({LEFT} {top})">']
     for lower, upper, style in panel.bands:
         y_upper, y_lower = down(np.array([upper, lower]))
-        parts.append(f'<rect class="{style}" y="{y_upper:.1f}" width="{inner}" height="{y_lower - y_upper:.1f}"/>')
-    for value, text in _axis_ticks(panel.limits, max(2, height // 36), panel.log):
+        parts.append(
+            f'<rect class="{style}" y="{y_upper:.1f}" width="{inner}" height="{y_lower - y_upper:.1f}"/>'
+        )
+    for value, text in _axis_ticks(panel.limits, max(3, height // 36), panel.log):
         y = float(down(np.array([value]))[0])
-        parts.append(f'<path class="grid" d="M0 {y:.1f}h{inner}"/><text x="-6" y="{y + 4:.1f}" class="end">{text}</text>')
+        parts.append(
+            f'<path class="grid" d="M0 {y:.1f}h{inner}"/><text x="-6" y="{y + 4:.1f}" class="end">{text}</text>'
+        )
     parts.append('<g transform="scale(.1)">')
     for curve in panel.curves:
         data = path_data(_scaled(curve.x, x_limits, inner, x_log), down(curve.y))
         parts.append(f'<path class="{curve.style}" d="{data}"/>')
     parts.append("</g>")
     if panel.label:
-        parts.append(f'<text class="panel" x="4" y="12">{panel.label}</text>')
+        parts.append(f'<text class="panel" x="0" y="-5">{panel.label}</text>')
     return "".join(parts) + "</g>"
 
 
@@ -167,6 +170,8 @@ def _x_axis_svg(limits: tuple[float, float], label: str, width: int, top: int, l
     parts = [f'<g transform="translate({LEFT} {top})"><path class="axis" d="M0 0h{inner}"/>']
     for value, text in _axis_ticks(limits, max(2, inner // 90), log):
         x = float(_scaled(np.array([value]), limits, inner, log)[0])
-        parts.append(f'<path class="axis" d="M{x:.1f} 0v4"/><text x="{x:.1f}" y="17" class="mid">{text}</text>')
-    parts.append(f'<text x="{inner}" y="29" class="end">{label}</text></g>')
+        parts.append(
+            f'<path class="axis" d="M{x:.1f} 0v4"/><text x="{x:.1f}" y="17" class="mid">{text}</text>'
+        )
+    parts.append(f'<text x="-10" y="17" class="end">{label}</text></g>')
     return "".join(parts)

@@ -32,7 +32,9 @@ class ResidualSummary:
         return float(self.correlation[0]) if len(self.correlation) else 0.0
 
 
-def summarise_residual(time: Array, residual: Array, *, lags: int = 40, bins: int = 41) -> ResidualSummary:
+def summarise_residual(
+    time: Array, residual: Array, *, longest_lag: float = 4.0, bins: int = 41
+) -> ResidualSummary:
     """Summarise a residual.
 
     Parameters
@@ -41,14 +43,16 @@ def summarise_residual(time: Array, residual: Array, *, lags: int = 40, bins: in
         s. Taken as evenly spaced at its median interval: gaps blur spectrum and correlation a little.
     residual : (n,) array
         In units of the noise of one sample.
-    lags, bins : int
-        Length of the correlation and of the histogram.
+    longest_lag : float
+        s, of the correlation; at most a quarter of the series.
+    bins : int
+        Of the histogram, within five standard deviations; what lies beyond counts in the outermost.
     """
     interval = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     span = 5.0
     counts, edges = np.histogram(np.clip(residual, -span, span), bins=bins, range=(-span, span))
     frequency, power = _spectrum(residual, interval)
-    correlation = _correlation(residual, lags)
+    correlation = _correlation(residual, round(longest_lag / interval))
     return ResidualSummary(
         mean=float(np.mean(residual)),
         rms=float(np.sqrt(np.mean(np.square(residual)))),
@@ -69,13 +73,21 @@ def _spectrum(residual: Array, interval: float) -> tuple[Array, Array]:
         return np.empty(0), np.empty(0)
     length = min(len(residual), max(16, min(4096, len(residual) // 4)))
     frequency, density = signal.welch(residual, fs=1.0 / interval, nperseg=length, detrend=False)
-    return frequency[1:], density[1:] / (2.0 * interval)
+    return _log_average(frequency[1:], density[1:] / (2.0 * interval))
+
+
+def _log_average(frequency: Array, power: Array, per_decade: int = 24) -> tuple[Array, Array]:
+    """Means over equal stretches of the logarithm of frequency, so that the dense end stays legible."""
+    stretch = np.floor(per_decade * np.log10(frequency / frequency[0]) + 1e-9).astype(int)
+    _, index, count = np.unique(stretch, return_inverse=True, return_counts=True)
+    return np.bincount(index, frequency) / count, np.bincount(index, power) / count
 
 
 def _correlation(residual: Array, lags: int) -> Array:
     centred = residual - np.mean(residual)
     power = float(centred @ centred)
-    count = min(lags, len(residual) - 1)
+    count = min(lags, len(residual) // 4)
     if power == 0.0 or count < 1:
         return np.empty(0)
-    return np.array([centred[k:] @ centred[:-k] for k in range(1, count + 1)]) / power
+    full = signal.correlate(centred, centred, mode="full", method="fft")
+    return np.asarray(full[len(residual) : len(residual) + count] / power)

@@ -45,7 +45,11 @@ def rest_pose(rig: Rig, center_of_mass_body: Array) -> tuple[Array, Array]:
 
     first = np.concatenate([start[:3], np.zeros(3)])
     found = minimize(
-        height, first, method="SLSQP", constraints={"type": "ineq", "fun": spare_length}, options={"maxiter": 200}
+        height,
+        first,
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": spare_length},
+        options={"maxiter": 200},
     )
     best = found.x if np.all(np.isfinite(found.x)) else first
     return pose(best)

@@ -59,7 +59,9 @@ def _estimate(estimate: InertialEstimate) -> dict[str, object]:
     return {
         "mass": {key: column[0] for key, column in masked.items()},
         "center_of_mass": {key: column[1:4] for key, column in masked.items()},
-        "inertia": {key: [[column[i] for i in row] for row in INERTIA_INDEX] for key, column in masked.items()},
+        "inertia": {
+            key: [[column[i] for i in row] for row in INERTIA_INDEX] for key, column in masked.items()
+        },
     }
 
 

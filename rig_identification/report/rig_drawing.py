@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 
@@ -79,7 +80,10 @@ def rig_svgs(scene: Scene) -> list[tuple[str, str]]:
         min((WIDTH - 2 * MARGIN) / max(hi[0] - lo[0], 1e-6), (HEIGHT - 2 * MARGIN) / max(hi[1] - lo[1], 1e-6))
         for lo, hi in boxes
     )
-    return [(v.name, _view_svg(scene, v, 0.5 * (lo + hi), scale)) for v, (lo, hi) in zip(VIEWS, boxes, strict=True)]
+    return [
+        (v.name, _view_svg(scene, v, 0.5 * (lo + hi), scale))
+        for v, (lo, hi) in zip(VIEWS, boxes, strict=True)
+    ]
 
 
 def _extent(scene: Scene, view: View) -> tuple[Array, Array]:
@@ -88,7 +92,9 @@ def _extent(scene: Scene, view: View) -> tuple[Array, Array]:
     lower, upper = flat.min(axis=0), flat.max(axis=0)
     if scene.center_of_mass is not None:
         middle = view.axes @ scene.center_of_mass
-        reach = np.zeros(2) if scene.ellipsoid is None else np.linalg.norm(view.axes @ scene.ellipsoid, axis=1)
+        reach = (
+            np.zeros(2) if scene.ellipsoid is None else np.linalg.norm(view.axes @ scene.ellipsoid, axis=1)
+        )
         lower, upper = np.minimum(lower, middle - reach), np.maximum(upper, middle + reach)
     return lower, upper
 
@@ -137,7 +143,12 @@ def _cable(name: str, top: Array, bottom: Array) -> str:
     line = f'<path class="cable" d="M{top[0]:.1f} {top[1]:.1f}L{bottom[0]:.1f} {bottom[1]:.1f}"/>'
     ceiling = f'<path class="ceiling" d="M{top[0] - 9:.1f} {top[1]:.1f}h18"/>'
     hinge = f'<circle class="hinge" cx="{bottom[0]:.1f}" cy="{bottom[1]:.1f}" r="3"/>'
-    return line + ceiling + hinge + f'<text class="mid" x="{top[0]:.1f}" y="{top[1] - 7:.1f}">{escape(name)}</text>'
+    return (
+        line
+        + ceiling
+        + hinge
+        + f'<text class="mid" x="{top[0]:.1f}" y="{top[1] - 7:.1f}">{escape(name)}</text>'
+    )
 
 
 def _device(name: str, point: Array) -> str:
@@ -148,8 +159,7 @@ def _device(name: str, point: Array) -> str:
     )
 
 
-def _body_axes(scene: Scene, at: object) -> list[str]:
-    assert callable(at)
+def _body_axes(scene: Scene, at: Callable[[Array], Array]) -> list[str]:
     origin, R_world_body = scene.body_axes
     start = at(origin)
     parts = []
@@ -159,7 +169,7 @@ def _body_axes(scene: Scene, at: object) -> list[str]:
         full = np.linalg.norm(at(origin + R_world_body @ np.ones(3)) - start) or 1.0
         if size < 0.15 * full:
             continue  # points at the reader
-        tip = start + unit * (26.0 / full) * 1.3
+        tip = start + unit * (40.0 / full)
         label = start + unit / size * (np.linalg.norm(tip - start) + 8.0)
         parts.append(
             f'<path class="frame" d="M{start[0]:.1f} {start[1]:.1f}L{tip[0]:.1f} {tip[1]:.1f}"/>'

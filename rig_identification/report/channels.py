@@ -1,0 +1,127 @@
+"""Every channel of every recording: measured against predicted, and the residual in units of its noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+from markupsafe import Markup
+
+from rig_identification.report.envelope import envelope, worst_stretch
+from rig_identification.report.line_chart import Curve, Panel, chart_svg, padded_limits
+from rig_identification.report.quantity import significant, unit_text
+from rig_identification.result import ChannelFit
+
+#: Bytes that all charts of a page may take; a page then stays well under five megabytes.
+BUDGET = 2_500_000
+BYTES_PER_COLUMN = 3 * 2 * 6  # three curves, two samples a column, some six characters a sample
+MOST_COLUMNS = 456  # one a pixel
+
+
+@dataclass(frozen=True)
+class ChannelView:
+    """One channel of one recording."""
+
+    label: str
+    anchor: str
+    rms: float
+    noise: str  # "2.1 N, from the rig description"
+    full: Markup
+    close_up: Markup | None
+    close_up_at: str
+
+
+@dataclass(frozen=True)
+class RecordingView:
+    """All channels of one recording."""
+
+    name: str
+    role: str  # "held out", "fitted", "at rest"
+    rms: float
+    channels: tuple[ChannelView, ...]
+    open: bool
+
+
+def channel_label(fit: ChannelFit) -> str:
+    """Name of a channel for a person: ``imu angular rate x``."""
+    words = [fit.channel, fit.quantity.replace("_", " "), fit.axis or ""]
+    return " ".join(w for w in words if w)
+
+
+def channel_anchor(fit: ChannelFit) -> str:
+    """Fragment of the page that shows a channel."""
+    words = [fit.recording, fit.channel, fit.quantity, fit.axis or ""]
+    return "-".join("".join(c if c.isalnum() or c == "_" else "_" for c in w) for w in words if w)
+
+
+def recording_views(channels: tuple[ChannelFit, ...], roles: dict[str, str]) -> list[RecordingView]:
+    """Group the channels by recording, held-out ones first, then the fitted and those at rest.
+
+    Parameters
+    ----------
+    channels : tuple of ChannelFit
+    roles : dict
+        Recording name -> "held out", "fitted" or "at rest".
+    """
+    order = {"held out": 0, "fitted": 1, "at rest": 2}
+    names = sorted(dict.fromkeys(c.recording for c in channels), key=lambda n: order.get(roles.get(n, ""), 3))
+    pictures = sum(1 if roles.get(c.recording) == "at rest" else 2 for c in channels)
+    columns = int(np.clip(BUDGET / BYTES_PER_COLUMN / max(pictures, 1), 40, MOST_COLUMNS))
+    views = []
+    for name in names:
+        fits = [c for c in channels if c.recording == name]
+        role = roles.get(name, "")
+        shown = tuple(_channel_view(c, columns, close_up=role != "at rest") for c in fits)
+        rms = float(np.sqrt(np.mean(np.concatenate([c.residual_in_sigma for c in fits]) ** 2)))
+        views.append(RecordingView(name, role, rms, shown, open=name == names[0]))
+    return views
+
+
+def _channel_view(fit: ChannelFit, columns: int, *, close_up: bool) -> ChannelView:
+    start, end = float(fit.time[0]), float(fit.time[-1])
+    width = float(np.clip((end - start) / 6.0, 2.0, 6.0))
+    where = worst_stretch(fit.time, fit.residual_in_sigma, width)
+    close_up = close_up and end - start > 2.0 * width
+    source = "estimated from the recordings" if fit.noise_estimated else "from the rig description"
+    return ChannelView(
+        label=channel_label(fit),
+        anchor=channel_anchor(fit),
+        rms=fit.rms_in_sigma,
+        noise=f"{significant(fit.noise_std, 2)} {unit_text(fit.unit)}, {source}",
+        full=_chart(fit, (start, end), columns),
+        close_up=_chart(fit, where, columns) if close_up else None,
+        close_up_at=f"{where[0]:.1f} s to {where[1]:.1f} s" if close_up else "",
+    )
+
+
+def _chart(fit: ChannelFit, window: tuple[float, float], columns: int) -> Markup:
+    inside = (fit.time >= window[0]) & (fit.time <= window[1])
+    time, measured, predicted = fit.time[inside], fit.measured[inside], fit.predicted[inside]
+    residual = fit.residual_in_sigma[inside]
+    reach = max(4.0, 1.05 * float(np.max(np.abs(residual), initial=0.0)))
+    signal = Panel(
+        curves=(
+            Curve(*envelope(time, measured, columns), "measured"),
+            Curve(*envelope(time, predicted, columns), "predicted"),
+        ),
+        height=130,
+        limits=padded_limits(measured, predicted),
+        label=escape(unit_text(fit.unit)),
+    )
+    strip = Panel(
+        curves=(Curve(*envelope(time, residual, columns), "residual"),),
+        height=64,
+        limits=(-reach, reach),
+        bands=((-1.96, 1.96, "band"),),
+        label="residual, σ",
+    )
+    limits = window if window[1] > window[0] else (window[0] - 0.5, window[1] + 0.5)
+    return Markup(
+        chart_svg(
+            [signal, strip],
+            x_limits=limits,
+            x_label="s",
+            title=escape(f"{fit.recording} {channel_label(fit)}"),
+        )
+    )

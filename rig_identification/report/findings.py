@@ -1,0 +1,120 @@
+"""What the ideal model left out: each finding with its place, its size, its evidence and its price."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig_identification.report.quantity import number, significant, unit_text, value_and_half_width
+from rig_identification.report.ten_numbers import Element, elements
+from rig_identification.result import ELEMENTS, Finding, Identification, Mismatch
+
+
+@dataclass(frozen=True)
+class FindingView:
+    """One finding, written out."""
+
+    title: str
+    anchor: str
+    statement: str
+    where: tuple[tuple[str, str], ...]
+    parameters: tuple[tuple[str, str, str, str], ...]  # name, value, half-width, unit
+    gain: str | None
+    before: float | None  # held-out error
+    after: float | None
+
+
+@dataclass(frozen=True)
+class Shift:
+    """One of the ten numbers in the ideal model and with the findings in it."""
+
+    before: Element
+    after: Element
+    shift: str  # in standard deviations of the second
+
+
+def finding_views(mismatch: Mismatch) -> list[FindingView]:
+    """Write out every finding."""
+    return [_view(finding, index) for index, finding in enumerate(mismatch.findings, start=1)]
+
+
+def alternative_rows(mismatch: Mismatch) -> list[tuple[str, str]]:
+    """Effect and how much less likely it is, in log likelihood."""
+    rows = []
+    for alternative in mismatch.alternatives:
+        gap = alternative.get("log_likelihood_gap")
+        rows.append((_words(str(alternative.get("effect", ""))), _number(gap)))
+    return rows
+
+
+def shifts(identification: Identification) -> list[Shift]:
+    """What the findings did to the ten numbers.
+
+    ``figures["ideal"]`` is the :class:`Identification` of the ideal model, where there are findings.
+    """
+    ideal = identification.figures.get("ideal")
+    if not isinstance(ideal, Identification):
+        return []
+    rows = []
+    pairs = zip(elements(ideal.total), elements(identification.total), strict=True)
+    for i, (before, after) in enumerate(pairs):
+        std = float(np.sqrt(max(identification.total.covariance[i, i], 0.0)))
+        moved = float(identification.total.values[i] - ideal.total.values[i])
+        known = before.observable and after.observable and std > 0.0
+        rows.append(Shift(before, after, number(moved / std, 1) if known else "–"))
+    assert len(rows) == len(ELEMENTS)
+    return rows
+
+
+def _view(finding: Finding, index: int) -> FindingView:
+    return FindingView(
+        title=_words(finding.effect).capitalize(),
+        anchor=f"finding-{index}",
+        statement=finding.statement,
+        where=tuple((key, _place(key, value)) for key, value in finding.where.items() if value is not None),
+        parameters=tuple(_parameter(name, entry) for name, entry in finding.parameters.items()),
+        gain=_number(finding.evidence.get("log_likelihood_gain")),
+        before=_finite(finding.evidence.get("holdout_error_before")),
+        after=_finite(finding.evidence.get("holdout_error_after")),
+    )
+
+
+def _parameter(name: str, entry: Mapping[str, object]) -> tuple[str, str, str, str]:
+    value, std = _finite(entry.get("value")), _finite(entry.get("std"))
+    unit = unit_text(str(entry.get("unit") or ""))
+    if value is None:
+        return _words(name), str(entry.get("value", "–")), "", unit
+    if std is None:
+        return _words(name), significant(value, 4), "", unit
+    if not 1e-3 <= abs(value) < 1e6:
+        return _words(name), significant(value, 4), significant(1.96 * std, 2), unit
+    return _words(name), *value_and_half_width(value, std), unit
+
+
+def _place(key: str, value: object) -> str:
+    if key == "times" and isinstance(value, Sequence):
+        return "; ".join(_time(t) for t in value if isinstance(t, Mapping))
+    if key == "position" and isinstance(value, (Sequence, np.ndarray)):
+        return "(" + ", ".join(number(float(v), 2) for v in value) + ") m in body"
+    return str(value)
+
+
+def _time(span: Mapping[str, object]) -> str:
+    return f"{span.get('recording')}, {_number(span.get('start'))} s to {_number(span.get('end'))} s"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _finite(value: object) -> float | None:
+    if isinstance(value, (int, float, np.number)) and np.isfinite(value):
+        return float(value)
+    return None
+
+
+def _number(value: object) -> str:
+    finite = _finite(value)
+    return "–" if finite is None else significant(finite, 3)

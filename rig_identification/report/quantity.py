@@ -1,0 +1,53 @@
+"""Numbers as a person reads them: as many digits as the interval deserves."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+NOT_DETERMINED = "not determinable"
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+Z_95 = 1.959964  # half-width of a 95 % interval in standard deviations
+
+
+def decimals(half_width: float) -> int:
+    """Decimal places that show two significant digits of an interval's half-width."""
+    if not np.isfinite(half_width) or half_width <= 0.0:
+        return 3
+    return int(np.clip(1 - np.floor(np.log10(half_width)), 0, 9))
+
+
+def number(value: float, places: int) -> str:
+    """Fixed places, thin spaces between thousands, a true minus sign, no negative zero."""
+    text = f"{value:,.{places}f}"
+    if not any(digit in text for digit in "123456789"):
+        text = text.lstrip("-")
+    return text.replace(",", "\u202f").replace("-", "−")
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number of stated significant digits, powers of ten written out."""
+    if not np.isfinite(value):
+        return "–"
+    if value != 0.0 and not 1e-3 <= abs(value) < 1e5:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}×10".replace("-", "−") + str(int(exponent)).translate(SUPERSCRIPT)
+    places = 0 if value == 0.0 else max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
+    return number(value, places)
+
+
+def value_and_half_width(value: float, std: float) -> tuple[str, str]:
+    """A value and the half-width of its 95 % interval, to the same places."""
+    half = Z_95 * std
+    places = decimals(half)
+    return number(value, places), number(half, places) if np.isfinite(half) else "–"
+
+
+def unit_text(unit: str) -> str:
+    """A unit as it is printed: ``m/s^2`` becomes m/s²; the unit of a pure number says nothing."""
+    return (
+        ""
+        if unit == "1"
+        else re.sub(r"\^(-?\d+)", lambda m: m[1].translate(SUPERSCRIPT), unit).replace("*", " ")
+    )
