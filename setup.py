@@ -25,7 +25,7 @@ NODES: list[str] = []
 setup(
     name=NAME,
     version=VERSION,
-    description="Mass, centre of mass and inertia tensor of a body on a cable rig, and what its model left out",
+    description="Mass, centre of mass and inertia of a body on a cable rig, and what the model left out",
     long_description=(ROOT / "README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     author="rig_identification maintainers",

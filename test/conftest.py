@@ -1,4 +1,4 @@
-"""A session and its identification as the report and the command line see them: synthetic, no physics claimed."""
+"""A session and its identification as report and command line see them: synthetic, no physics claimed."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def make_channel(
     amplitude: float,
     seed: int,
 ) -> ChannelFit:
-    """A decaying swing with white noise and, for odd seeds, a slow error that white noise does not explain."""
+    """A decaying swing with white noise and, for one seed in five, a slow error beside it."""
     rng = np.random.default_rng(seed)
     static = recording.startswith("static")
     time = np.arange(0.0, 20.0 if static else 40.0, 0.005)
@@ -177,7 +177,7 @@ def make_finding() -> Finding:
         },
         parameters={"axial_stiffness": {"value": np.float64(4.1e6), "std": 2e4, "unit": "N"}},
         evidence={"log_likelihood_gain": 812.0, "holdout_error_before": 3.1, "holdout_error_after": 1.02},
-        statement="The cables stretch: under load cable_3 is 2.3 mm longer. Describe its stiffness or use a stiffer one.",
+        statement="The cables stretch: loaded, cable_3 is 2.3 mm longer. Describe its stiffness.",
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.recording import Recording, Session
 from rig_identification.report.quantity import Z_95, significant
@@ -25,8 +26,8 @@ class Determination:
 def determinations(identification: Identification, session: Session) -> list[Determination]:
     """How well each of the ten numbers is known.
 
-    A reason that the estimator gives in ``figures["unobservable_reasons"]`` (element -> sentence) comes first;
-    without one, the reason is what the session lacks.
+    A reason that the estimator gives in ``figures["unobservable_reasons"]`` (element -> sentence) comes
+    first; without one, the reason is what the session lacks.
     """
     given = identification.figures.get("unobservable_reasons")
     reasons = given if isinstance(given, Mapping) else {}
@@ -43,7 +44,7 @@ def determinations(identification: Identification, session: Session) -> list[Det
     return rows
 
 
-def _scales(values: np.ndarray) -> list[float]:
+def _scales(values: NDArray[np.float64]) -> list[float]:
     """What an interval is compared with: the mass itself, the mean diagonal inertia; lengths stand alone."""
     inertia = float(np.mean(values[[4, 7, 9]]))
     return [float(values[0]), *[0.0] * 3, *[inertia] * 6]
@@ -76,7 +77,7 @@ def _reason(name: str, session: Session) -> str:
 
 def sensors_used(session: Session) -> list[tuple[str, str]]:
     """Each kind of sensor and the recordings that have it."""
-    kinds = {
+    kinds: dict[str, Callable[[Recording], bool]] = {
         "load cells": lambda r: bool(r.tension),
         "exciter force": lambda r: r.exciter_force is not None,
         "IMU": lambda r: r.imu is not None,
@@ -86,8 +87,7 @@ def sensors_used(session: Session) -> list[tuple[str, str]]:
     return [(kind, _having(session.recordings, has)) for kind, has in kinds.items()]
 
 
-def _having(recordings: tuple[Recording, ...], has: object) -> str:
-    assert callable(has)
+def _having(recordings: tuple[Recording, ...], has: Callable[[Recording], bool]) -> str:
     names = [r.name for r in recordings if has(r)]
     if not names:
         return "in no recording"

@@ -83,11 +83,14 @@ def _bar(shift: float, ratio: float) -> Markup:
     middle = HEIGHT / 2
     low, high = at(shift - Z_95 * ratio), at(shift + Z_95 * ratio)
     state = "far" if abs(shift) > 3.0 else "near"
+    shades = "".join(
+        f'<rect class="{name}" x="{at(-reach):.1f}" y="2" '
+        f'width="{at(reach) - at(-reach):.1f}" height="{HEIGHT - 4}"/>'
+        for name, reach in (("three", 3.0), ("one", 1.0))
+    )
     return Markup(
         f'<svg class="doubt" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">'
-        f"<title>{shift:+.2f} tolerances</title>"
-        f'<rect class="three" x="{at(-3.0):.1f}" y="2" width="{at(3.0) - at(-3.0):.1f}" height="{HEIGHT - 4}"/>'
-        f'<rect class="one" x="{at(-1.0):.1f}" y="2" width="{at(1.0) - at(-1.0):.1f}" height="{HEIGHT - 4}"/>'
+        f"<title>{shift:+.2f} tolerances</title>{shades}"
         f'<path class="zero" d="M{WIDTH / 2} 0v{HEIGHT}"/>'
         f'<path class="interval {state}" d="M{low:.1f} {middle}H{max(high, low + 0.5):.1f}"/>'
         f'<circle class="{state}" cx="{at(shift):.1f}" cy="{middle}" r="3.6"/></svg>'

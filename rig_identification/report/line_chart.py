@@ -153,7 +153,8 @@ def _panel_svg(panel: Panel, x_limits: tuple[float, float], width: int, top: int
     for value, text in _axis_ticks(panel.limits, max(3, height // 36), panel.log):
         y = float(down(np.array([value]))[0])
         parts.append(
-            f'<path class="grid" d="M0 {y:.1f}h{inner}"/><text x="-6" y="{y + 4:.1f}" class="end">{text}</text>'
+            f'<path class="grid" d="M0 {y:.1f}h{inner}"/>'
+            f'<text x="-6" y="{y + 4:.1f}" class="end">{text}</text>'
         )
     parts.append('<g transform="scale(.1)">')
     for curve in panel.curves:

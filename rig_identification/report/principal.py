@@ -36,7 +36,8 @@ def principal_inertia(estimate: InertialEstimate) -> PrincipalInertia | None:
     if set(ELEMENTS[4:]) & set(estimate.unobservable):
         return None
     moments, axes = np.linalg.eigh(inertia_matrix(estimate.values))
-    axes = axes * np.sign(axes[np.argmax(np.abs(axes), axis=0), range(3)])
+    largest: Array = axes[np.argmax(np.abs(axes), axis=0), np.arange(3)]
+    axes = axes * np.sign(largest)
     covariance = estimate.covariance[4:, 4:]
     slopes = np.array([[_slope(axes[:, i], axes[:, j]) for j in range(3)] for i in range(3)])
     margin_slope = slopes[0, 0] + slopes[1, 1] - slopes[2, 2]
@@ -69,7 +70,7 @@ def _tilt_std(axis: int, moments: Array, slopes: Array, covariance: Array) -> fl
         if other != axis:
             gap = abs(moments[axis] - moments[other])
             tilts.append(_std(slopes[axis, other], covariance) / gap if gap > 0.0 else np.pi / 2)
-    return float(min(np.hypot(*tilts), np.pi / 2))
+    return float(min(np.hypot(tilts[0], tilts[1]), np.pi / 2))
 
 
 def _semi_axes(estimate: InertialEstimate, moments: Array) -> Array | None:

@@ -1,4 +1,4 @@
-"""Residuals at a glance: a table of their size, and distribution, spectrum and correlation of each channel."""
+"""Residuals at a glance: their size in a table, and each channel's distribution, spectrum and correlation."""
 
 from __future__ import annotations
 

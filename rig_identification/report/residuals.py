@@ -61,7 +61,7 @@ def summarise_residual(
         density=counts / max(len(residual), 1) / (edges[1] - edges[0]),
         frequency=frequency,
         power=power,
-        lag=interval * np.arange(1, len(correlation) + 1),
+        lag=interval * np.arange(1.0, len(correlation) + 1.0),
         correlation=correlation,
         white_band=1.96 / np.sqrt(max(len(residual), 1)),
     )

@@ -21,8 +21,9 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
     Returns
     -------
     dict
-        Exactly the contract's keys. Elements named in ``unobservable`` are None, with their standard deviations
-        and their rows and columns of the covariance. ``without_frame`` is None where no frame was described.
+        Exactly the contract's keys. Elements named in ``unobservable`` are None, with their standard
+        deviations and their rows and columns of the covariance.
+        ``without_frame`` is None where no frame was described.
     """
     total = identification.total
     without_frame = identification.without_frame
@@ -55,7 +56,7 @@ def _estimate(estimate: InertialEstimate) -> dict[str, object]:
     variance = np.diag(estimate.covariance)
     with np.errstate(invalid="ignore"):  # an unobservable element may have no variance at all
         columns = {"value": estimate.values, "std": np.sqrt(variance)}
-    masked = {key: _plain(np.where(observable, column, np.nan)) for key, column in columns.items()}
+    masked = {key: _numbers(np.where(observable, column, np.nan)) for key, column in columns.items()}
     return {
         "mass": {key: column[0] for key, column in masked.items()},
         "center_of_mass": {key: column[1:4] for key, column in masked.items()},
@@ -80,6 +81,10 @@ def _mismatch(mismatch: Mismatch) -> dict[str, object]:
         ],
         "alternatives": _plain(mismatch.alternatives),
     }
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def _plain(value: object) -> object:
