@@ -28,6 +28,7 @@ from rig_identification.model.layout import (
     GRAVITY,
     LENGTH,
     OUT_ANGULAR_ACCELERATION,
+    OUT_GRAVITY,
     OUT_POSITION,
     OUT_RATE,
     OUT_ROTATION,
@@ -197,16 +198,17 @@ def _write_outputs(physics, R, x, z, out):  # type: ignore[no-untyped-def]
         for j in range(3):
             weight += R[j, i] * physics[GRAVITY + j]
         out[OUT_SPECIFIC_FORCE + i] = z[i] - weight
+        out[OUT_GRAVITY + i] = weight
     for i in range(n):
         out[OUT_TENSION + i] = z[6 + i]
 
 
 @njit(cache=True, nogil=True)
 def _write_output_columns(physics, R, dz, directions, out):  # type: ignore[no-untyped-def]
-    """out (15 + n, 18 + len(directions)): derivative of raw outputs in state, wrench, physics."""
+    """out (OUT_TENSION + n, 18 + len(directions)): derivative of raw outputs in state, wrench, physics."""
     n = dz.shape[0] - 6
     m = dz.shape[1]
-    for i in range(15):
+    for i in range(OUT_TENSION):
         for c in range(m):
             out[i, c] = 0.0
     g = np.zeros(3)
@@ -220,18 +222,21 @@ def _write_output_columns(physics, R, dz, directions, out):  # type: ignore[no-u
         for c in range(m):
             out[OUT_SPECIFIC_FORCE + i, c] = dz[i, c]
             out[OUT_ANGULAR_ACCELERATION + i, c] = dz[3 + i, c]
-    # d(R^T g) = (R^T g) x dtheta, and R^T dg; specific force takes them with a minus
-    out[OUT_SPECIFIC_FORCE, ROTATION + 1] += g[2]
-    out[OUT_SPECIFIC_FORCE, ROTATION + 2] -= g[1]
-    out[OUT_SPECIFIC_FORCE + 1, ROTATION] -= g[2]
-    out[OUT_SPECIFIC_FORCE + 1, ROTATION + 2] += g[0]
-    out[OUT_SPECIFIC_FORCE + 2, ROTATION] += g[1]
-    out[OUT_SPECIFIC_FORCE + 2, ROTATION + 1] -= g[0]
+    # d(R^T g) = (R^T g) x dtheta + R^T dg
+    out[OUT_GRAVITY, ROTATION + 1] = -g[2]
+    out[OUT_GRAVITY, ROTATION + 2] = g[1]
+    out[OUT_GRAVITY + 1, ROTATION] = g[2]
+    out[OUT_GRAVITY + 1, ROTATION + 2] = -g[0]
+    out[OUT_GRAVITY + 2, ROTATION] = -g[1]
+    out[OUT_GRAVITY + 2, ROTATION + 1] = g[0]
     for k in range(directions.shape[0]):
         d = directions[k]
         if GRAVITY <= d < GRAVITY + 3:
             for i in range(3):
-                out[OUT_SPECIFIC_FORCE + i, 12 + WRENCH + k] -= R[d - GRAVITY, i]
+                out[OUT_GRAVITY + i, 12 + WRENCH + k] = R[d - GRAVITY, i]
+    for i in range(3):
+        for c in range(m):
+            out[OUT_SPECIFIC_FORCE + i, c] -= out[OUT_GRAVITY + i, c]
     for i in range(n):
         for c in range(m):
             out[OUT_TENSION + i, c] = dz[6 + i, c]
@@ -290,9 +295,9 @@ def propagate(  # type: ignore[no-untyped-def]
     body axes, held over the interval. directions (d,): entries of ``physics`` to
     differentiate in (EXCITER_CLOCK: clock). start_columns (12, s + d): derivative of the
     start state in s start coordinates and the d directions.
-    Filled: nodes_x (N, 12), nodes_R (N, 3, 3), nodes_out (N, 15 + n); and where
-    ``sensitivity``: A (N, 12, 12), B (N, 12, 6), H (N, 15 + n, 12), D (N, 15 + n, 6), and
-    J (N, 15 + n, s + d), total derivatives of the raw outputs.
+    Filled: nodes_x (N, 12), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and where
+    ``sensitivity``: A (N, 12, 12), B (N, 12, 6), H (N, OUT_TENSION + n, 12), D (N, OUT_TENSION + n, 6), and
+    J (N, OUT_TENSION + n, s + d), total derivatives of the raw outputs.
     """
     nodes = forces.shape[0]
     n = modes.shape[0]
@@ -317,7 +322,7 @@ def propagate(  # type: ignore[no-untyped-def]
     columns = np.zeros((12, local if sensitivity else 0))
     stage = np.zeros((12, local if sensitivity else 0))
     slopes = np.empty((4, 12, local if sensitivity else 0))
-    out_columns = np.empty((15 + n, local if sensitivity else 0))
+    out_columns = np.empty((OUT_TENSION + n, local if sensitivity else 0))
     S = start_columns.copy()
     for node in range(nodes):
         last = node == nodes - 1

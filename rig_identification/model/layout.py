@@ -40,7 +40,8 @@ OUT_ROTATION = 3  # 3: (derivatives only) right-hand rotation increment, rad, bo
 OUT_RATE = 6  # 3: rad/s, body axes
 OUT_SPECIFIC_FORCE = 9  # 3: acceleration of the datum less gravity, body axes, m/s^2
 OUT_ANGULAR_ACCELERATION = 12  # 3: rad/s^2, body axes
-OUT_TENSION = 15  # n: N
+OUT_GRAVITY = 15  # 3: acceleration of gravity, body axes, m/s^2
+OUT_TENSION = 18  # n: N
 
 
 def cable_offset(index: int) -> int:

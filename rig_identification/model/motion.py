@@ -121,13 +121,13 @@ class Input:
 class Motion:
     """Motion at the nodes; derivatives where they were asked for.
 
-    ``outputs`` (N, 15 + n): see the OUT_ entries of layout.py. A, B, H, D, J: see integrate.py.
+    ``outputs`` (N, 18 + n): see the OUT_ entries of layout.py. A, B, H, D, J: see integrate.py.
     """
 
     step: float
     states: Array  # (N, 12)
     R_world_body: Array  # (N, 3, 3)
-    outputs: Array  # (N, 15 + n)
+    outputs: Array  # (N, 18 + n)
     nodes: int  # nodes reached: fewer than asked where the motion left every bound
     A: Array | None = None
     B: Array | None = None
@@ -145,18 +145,25 @@ class Motion:
         return state_from_vector(self.states[node], self.R_world_body[node])
 
 
-def substeps_for(model: RigModel, step: float) -> int:
-    """Substeps that keep the stiffest elastic mode resolved: omega h <= 0.5."""
+#: Longest step (s) that keeps rigid-cable motion of vehicle rigs (modes up to 1.5 Hz) within 1e-7 m in 10 s.
+FINE_STEP = 0.0034
+#: Longest step for fits: truncation of 1e-6 m, three orders below the sensors' noise.
+FIT_STEP = 0.005
+
+
+def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> int:
+    """Substeps no longer than ``longest`` that resolve the stiffest elastic mode: omega h <= 0.5."""
+    plain = max(1, int(np.ceil(step / longest - 1e-9)))
     elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
     if not np.any(elastic):
-        return 1
+        return plain
     stiffness = 0.0
     for i in np.flatnonzero(elastic):
         o = layout.cable_offset(int(i))
         stiffness += model.physics[o + layout.AXIAL_STIFFNESS] / model.physics[o + layout.LENGTH]
     # Pitch and roll on the cables run faster than bounce by at most arm over gyration radius, about 2
     omega = 2.0 * np.sqrt(stiffness / model.physics[layout.INERTIAL])
-    return max(1, int(np.ceil(step * omega / 0.5)))
+    return max(plain, int(np.ceil(step * omega / 0.5)))
 
 
 def simulate(
@@ -182,7 +189,7 @@ def simulate(
     columns = np.zeros((12, basis.shape[1] + chosen.size))
     columns[:, : basis.shape[1]] = basis
     project_columns(model.physics, model.modes, x, R, chosen, basis.shape[1], columns)
-    nodes, outputs = drive.force.shape[0], 15 + model.cables
+    nodes, outputs = drive.force.shape[0], layout.OUT_TENSION + model.cables
     kept = nodes if sensitivity else 0
     states, rotations = np.zeros((nodes, 12)), np.zeros((nodes, 3, 3))
     out = np.zeros((nodes, outputs))
@@ -200,7 +207,7 @@ def simulate(
         np.ascontiguousarray(drive.force_rate),
         np.ascontiguousarray(drive.wrench),
         drive.step,
-        substeps or substeps_for(model, drive.step),
+        substeps or substeps_for(model, drive.step, FIT_STEP if sensitivity else FINE_STEP),
         chosen,
         columns,
         sensitivity,

@@ -1,0 +1,163 @@
+"""What each device reads, given the body's motion: pure functions with their exact derivatives.
+
+Every function takes the raw outputs of motion.py (``raw`` (N, 18 + n)) and the device's
+own numbers, and returns a :class:`Reading`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rig_identification.model import layout
+from rig_identification.model.so3 import inverse_right_jacobian, left_jacobian, skew
+
+Array = NDArray[np.float64]
+
+RATE = slice(layout.OUT_RATE, layout.OUT_RATE + 3)
+SPECIFIC_FORCE = slice(layout.OUT_SPECIFIC_FORCE, layout.OUT_SPECIFIC_FORCE + 3)
+ANGULAR_ACCELERATION = slice(layout.OUT_ANGULAR_ACCELERATION, layout.OUT_ANGULAR_ACCELERATION + 3)
+ROTATION = slice(layout.OUT_ROTATION, layout.OUT_ROTATION + 3)
+POSITION = slice(layout.OUT_POSITION, layout.OUT_POSITION + 3)
+GRAVITY = slice(layout.OUT_GRAVITY, layout.OUT_GRAVITY + 3)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Values (N, w), their derivative in the raw outputs (N, w, 18 + n), and in the device's numbers (N, w, q)."""
+
+    values: Array
+    in_raw: Array
+    in_device: Array
+
+
+#: load_cell: gain error 1, zero N
+LOAD_CELL_SIZE = 2
+
+
+def load_cell(raw: Array, cable: int, device: Array) -> Reading:
+    """Tension (1 + gain) T + zero of one cable, N. device (2,): gain error, zero."""
+    nodes, width = raw.shape
+    tension = raw[:, layout.OUT_TENSION + cable]
+    in_raw = np.zeros((nodes, 1, width))
+    in_raw[:, 0, layout.OUT_TENSION + cable] = 1.0 + device[0]
+    in_device = np.zeros((nodes, 1, LOAD_CELL_SIZE))
+    in_device[:, 0, 0] = tension
+    in_device[:, 0, 1] = 1.0
+    return Reading(((1.0 + device[0]) * tension + device[1])[:, None], in_raw, in_device)
+
+
+#: imu: position error 3, rotation error 3, gyroscope bias 3 and scale 3, accelerometer bias 3 and scale 3
+IMU_SIZE = 18
+
+
+def imu(raw: Array, position: Array, orientation: Array, device: Array) -> Reading:
+    """Angular rate and specific force (N, 6) in the IMU frame, at its origin.
+
+    position (3,) m and orientation (3, 3): as described. device (18,): position error m,
+    rotation vector of the frame against its description (rad, body axes), gyroscope bias
+    rad/s, gyroscope scale error, accelerometer bias m/s^2, accelerometer scale error.
+    Specific force at the lever arm r: f + alpha x r + w x (w x r).
+    """
+    r = position + device[0:3]
+    turn = Rotation.from_rotvec(device[3:6]).as_matrix() @ orientation
+    to_imu = turn.T
+    gyro_scale, accel_scale = np.diag(1.0 + device[9:12]), np.diag(1.0 + device[15:18])
+    w, f, alpha = raw[:, RATE], raw[:, SPECIFIC_FORCE], raw[:, ANGULAR_ACCELERATION]
+    at_imu = f + np.cross(alpha, r) + np.cross(w, np.cross(w, r))
+    nodes, width = raw.shape
+    values = np.concatenate(
+        [w @ (gyro_scale @ to_imu).T + device[6:9], at_imu @ (accel_scale @ to_imu).T + device[12:15]], axis=1
+    )
+    C_gyro, C_accel = gyro_scale @ to_imu, accel_scale @ to_imu
+    in_raw = np.zeros((nodes, 6, width))
+    in_raw[:, :3, RATE] = C_gyro
+    in_raw[:, 3:, SPECIFIC_FORCE] = C_accel
+    in_raw[:, 3:, ANGULAR_ACCELERATION] = -C_accel @ skew(r)
+    # d(w x (w x r)) = -(skew(w x r) + skew(w) skew(r)) dw
+    in_raw[:, 3:, RATE] = -C_accel @ (skew(np.cross(w, r)) + skew(w) @ skew(r))
+    in_device = np.zeros((nodes, 6, IMU_SIZE))
+    in_device[:, 3:, 0:3] = C_accel @ (skew(alpha) + skew(w) @ skew(w))
+    J = left_jacobian(device[3:6])
+    in_device[:, :3, 3:6] = C_gyro @ skew(w) @ J
+    in_device[:, 3:, 3:6] = C_accel @ skew(at_imu) @ J
+    for i in range(3):
+        in_device[:, i, 6 + i] = 1.0
+        in_device[:, i, 9 + i] = (w @ to_imu.T)[:, i]
+        in_device[:, 3 + i, 12 + i] = 1.0
+        in_device[:, 3 + i, 15 + i] = (at_imu @ to_imu.T)[:, i]
+    return Reading(values, in_raw, in_device)
+
+
+#: inclinometer: rotation error 3
+INCLINOMETER_SIZE = 3
+
+
+def inclinometer(raw: Array, orientation: Array, device: Array) -> Reading:
+    """Angles (N, 2) of the inclinometer's x and y axis above the horizontal plane, rad.
+
+    orientation (3, 3): as described. device (3,): rotation vector against it, rad, body axes.
+    """
+    turn = Rotation.from_rotvec(device).as_matrix() @ orientation
+    gravity = raw[:, GRAVITY]
+    size = np.linalg.norm(gravity, axis=1, keepdims=True)
+    up = -gravity / size
+    sine = np.clip(up @ turn[:, :2], -1.0, 1.0)
+    nodes, width = raw.shape
+    slope = 1.0 / np.sqrt(np.maximum(1.0 - sine**2, 1e-12))
+    in_up = slope[:, :, None] * turn[:, :2].T[None]
+    in_raw = np.zeros((nodes, 2, width))
+    in_raw[:, :, GRAVITY] = -(in_up - np.einsum("nij,nj->ni", in_up, up)[:, :, None] * up[:, None, :]) / size[:, :, None]
+    # d(axis) = d x axis: up . (d x axis) = d . (axis x up)
+    turned = np.cross(turn[:, :2].T[None], up[:, None, :])
+    in_device = slope[:, :, None] * turned @ left_jacobian(device)
+    return Reading(np.arcsin(sine), in_raw, in_device)
+
+
+#: mocap: marker position 3 and rotation 3 in body, tracker position 3 and rotation 3 in world
+MOCAP_SIZE = 12
+
+
+@dataclass(frozen=True)
+class MocapMount:
+    """Where the marker frame sits on the body, and the world in the tracker's frame (current belief)."""
+
+    marker_position: Array  # (3,) m, body
+    R_body_marker: Array  # (3, 3)
+    world_position: Array  # (3,) m, origin of world in the tracker frame
+    R_tracker_world: Array  # (3, 3)
+    R_tracker_mean: Array  # (3, 3) orientation about which rotation vectors are taken
+
+
+def mocap(raw: Array, R_world_body: Array, mount: MocapMount, device: Array) -> Reading:
+    """Pose (N, 6) of the marker frame in the tracker frame: position m, rotation vector about the mean rad.
+
+    device (12,): errors of the mount: marker position m (body), marker rotation (rad, body
+    axes, left), world position m (tracker), world rotation (rad, tracker axes, left).
+    """
+    r = mount.marker_position + device[0:3]
+    R_bm = Rotation.from_rotvec(device[3:6]).as_matrix() @ mount.R_body_marker
+    R_tw = Rotation.from_rotvec(device[9:12]).as_matrix() @ mount.R_tracker_world
+    shift = mount.world_position + device[6:9]
+    marker_world = raw[:, POSITION] + R_world_body @ r
+    position = marker_world @ R_tw.T + shift
+    R_tb = R_tw @ R_world_body
+    about_mean = mount.R_tracker_mean.T @ R_tb @ R_bm
+    turn = Rotation.from_matrix(about_mean).as_rotvec()
+    J_inverse = inverse_right_jacobian(turn)
+    nodes, width = raw.shape
+    in_raw = np.zeros((nodes, 6, width))
+    in_raw[:, :3, POSITION] = R_tw
+    in_raw[:, :3, ROTATION] = -R_tb @ skew(r)
+    in_raw[:, 3:, ROTATION] = J_inverse @ R_bm.T
+    in_device = np.zeros((nodes, 6, MOCAP_SIZE))
+    in_device[:, :3, 0:3] = R_tb
+    in_device[:, 3:, 3:6] = J_inverse @ R_bm.T @ left_jacobian(device[3:6])
+    in_device[:, :3, 6:9] = np.eye(3)
+    J_tracker = left_jacobian(device[9:12])
+    in_device[:, :3, 9:12] = -skew(position - shift) @ J_tracker
+    in_device[:, 3:, 9:12] = J_inverse @ (R_tb @ R_bm).transpose(0, 2, 1) @ J_tracker
+    return Reading(np.concatenate([position, turn], axis=1), in_raw, in_device)
