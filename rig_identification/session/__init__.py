@@ -2,5 +2,6 @@
 
 from rig_identification.session.read import read_session
 from rig_identification.session.rig_description import read_rig
+from rig_identification.session.write import write_session
 
-__all__ = ["read_rig", "read_session"]
+__all__ = ["read_rig", "read_session", "write_session"]

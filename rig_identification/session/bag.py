@@ -15,8 +15,9 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
+from zlib import crc32
 
-import lz4.frame
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Connection
@@ -282,9 +283,9 @@ def _mcap_buffers(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _decompressed(chunk: bytes) -> bytes:
-    _, _, size, _, name_length = _CHUNK.unpack_from(chunk)
+    _, _, size, checksum, name_length = _CHUNK.unpack_from(chunk)
     name = chunk[_CHUNK.size : _CHUNK.size + name_length]
-    records = chunk[_CHUNK.size + name_length + 8 :]
+    records = chunk[_CHUNK.size + name_length + 8 :]  # behind the length of the records
     if name == b"zstd":
         records = zstd.decompress(records)
     elif name == b"lz4":
@@ -293,4 +294,6 @@ def _decompressed(chunk: bytes) -> bytes:
         raise ValueError(f"mcap chunk compression {name.decode(errors='replace')} is unknown")
     if len(records) != size:
         raise ValueError(f"an mcap chunk holds {len(records)} bytes instead of {size}")
+    if checksum and crc32(records) != checksum:
+        raise ValueError("an mcap chunk does not match its checksum")
     return records

@@ -38,6 +38,7 @@ class Columns:
         identifier = bytes(data[0, :2])
         if identifier not in (b"\x00\x00", b"\x00\x01"):
             raise VaryingLayout
+        self.count = len(data)
         self._data = data
         self._order = ">" if identifier == b"\x00\x00" else "<"
         self._offset = _ENCAPSULATION
@@ -81,7 +82,7 @@ class Columns:
 def _first_double(columns: Columns) -> Floats:
     """(n, 1) first element of a float64 sequence, NaN where it is empty."""
     count = columns.length()
-    return columns.doubles(count)[:, :1] if count else np.full((len(columns._data), 1), np.nan)
+    return columns.doubles(count)[:, :1] if count else np.full((columns.count, 1), np.nan)
 
 
 def _wrench(columns: Columns) -> Floats:
@@ -129,10 +130,12 @@ _TYPES: dict[str, tuple[int, Callable[[Columns], Floats], Callable[[Any], tuple[
     "geometry_msgs/msg/PoseStamped": (7, lambda columns: columns.doubles(7), lambda m: _pose(m.pose)),
     "sensor_msgs/msg/Imu": (6, _imu, lambda m: _xyz(m.angular_velocity) + _xyz(m.linear_acceleration)),
     "nav_msgs/msg/Odometry": (
-        13, _odometry, lambda m: _pose(m.pose.pose) + _xyz(m.twist.twist.linear) + _xyz(m.twist.twist.angular),
+        13,
+        _odometry,
+        lambda m: _pose(m.pose.pose) + _xyz(m.twist.twist.linear) + _xyz(m.twist.twist.angular),
     ),
     "sensor_msgs/msg/JointState": (2, _joint_state, lambda m: (_first(m.position), _first(m.velocity))),
-}  # fmt: skip
+}
 
 
 def decode(topic: RawTopic) -> tuple[NDArray[np.int64], Floats]:
@@ -172,7 +175,8 @@ def _decode_each(topic: RawTopic, block: MessageBlock) -> tuple[list[int], list[
             message: Any = _TYPESTORE.deserialize_cdr(data.tobytes(), topic.message_type)
         except Exception as err:
             raise InputError(
-                f"{topic.name}: message {index} ({len(data)} bytes) is no {topic.message_type}; record the topic anew"
+                f"{topic.name}: message {index} ({len(data)} bytes) is no {topic.message_type}; "
+                "record the topic anew"
             ) from err
         stamps.append(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
         values.append(fields(message))

@@ -136,6 +136,7 @@ def _with_unit_quaternions(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quaternions scaled to norm 1; one of norm 0 or far from 1 is no orientation and becomes NaN."""
     norms = np.linalg.norm(values[:, 3:7], axis=1, keepdims=True)
     norms[np.abs(norms - 1.0) > 0.1] = np.nan
-    unit = values.copy()
+    norms[np.abs(norms - 1.0) < 1e-12] = 1.0  # a second reading changes nothing
+    unit = np.array(values)
     unit[:, 3:7] /= norms
     return unit

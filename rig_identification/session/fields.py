@@ -91,10 +91,8 @@ class Fields:
         vector = self.vector(key, 4, "1 (quaternion x y z w)")
         norm = float(np.linalg.norm(vector))
         if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
-            raise self.fault(
-                key,
-                f"norm {norm:g} is not 1 within {QUATERNION_NORM_TOLERANCE:g}; give a unit quaternion x y z w",
-            )
+            limit = f"{QUATERNION_NORM_TOLERANCE:g}"
+            raise self.fault(key, f"norm {norm:g} is not 1 within {limit}; give a unit quaternion x y z w")
         return vector / norm
 
     def choice(self, key: str, allowed: Iterable[str], default: str | None = None) -> str:
@@ -124,7 +122,7 @@ class Fields:
                 raise self.fault(str(key), f"unknown key; known are {', '.join(names)}")
 
     def refuse_misspelt(self, known: Iterable[str]) -> None:
-        """InputError for a key that looks like a misspelt one of ``known``; other keys are other tools' own."""
+        """InputError for a key that looks like one of ``known`` misspelt; others belong to other tools."""
         names = tuple(known)
         for key in self.values:
             close = get_close_matches(str(key), names, n=1, cutoff=0.8)

@@ -92,16 +92,17 @@ def _read_recording(entry: BagEntry, rig: Rig, expected: dict[str, Topic], names
 
 def _on_one_clock(channels: list[Channel]) -> tuple[list[Channel], list[Channel]]:
     """Channels whose stamps lie together, by majority, and the others."""
-    middle = np.median(
-        [channel.ordered_ns[len(channel.ordered_ns) // 2] - channels[0].ordered_ns[0] for channel in channels]
-    )
-    middle_ns = int(middle) + int(channels[0].ordered_ns[0])
-    span = max(int(np.ptp(channel.ordered_ns)) for channel in channels)
-    together, apart = [], []
-    for channel in channels:
-        distance = abs(int(channel.ordered_ns[len(channel.ordered_ns) // 2]) - middle_ns)
-        (apart if distance > span + _CLOCKS_APART else together).append(channel)
-    return (together, apart) if together else (apart, [])
+    reach = max(int(np.ptp(channel.ordered_ns)) for channel in channels) + _CLOCKS_APART
+    middles = [int(channel.ordered_ns[len(channel.ordered_ns) // 2]) for channel in channels]
+
+    def company(index: int) -> tuple[int, int]:
+        near = [abs(middle - middles[index]) <= reach for middle in middles]
+        return sum(near), len(channels[index].ordered_ns)
+
+    reference = middles[max(range(len(channels)), key=company)]
+    near = [abs(middle - reference) <= reach for middle in middles]
+    together = [channel for channel, is_near in zip(channels, near, strict=True) if is_near]
+    return together, [channel for channel, is_near in zip(channels, near, strict=True) if not is_near]
 
 
 def _left_aside(channel: Channel, rig: Rig, bag: Bag) -> str | None:
@@ -111,7 +112,7 @@ def _left_aside(channel: Channel, rig: Rig, bag: Bag) -> str | None:
         return None
     if device == "exciter" and np.any(channel.values):
         raise InputError(
-            f"{bag.folder}: {channel.topic.name}: a force is recorded but the rig description has no exciter; "
+            f"{bag.folder}: {channel.topic.name}: a force is recorded, the rig description has no exciter; "
             "add its position and orientation"
         )
     return f"the rig description has no {device}: left aside"
@@ -150,5 +151,6 @@ def _check_motion(recording: Recording, rig: Rig, bag: Bag) -> None:
         check_rest(recording, rig, str(bag.folder))
     elif recording.duration < SHORTEST_RUN:
         raise InputError(
-            f"{bag.folder}: dynamic run lasts {recording.duration:.3g} s, less than {SHORTEST_RUN:g} s; record a longer one"
+            f"{bag.folder}: dynamic run lasts {recording.duration:.3g} s, less than {SHORTEST_RUN:g} s; "
+            "record a longer one"
         )

@@ -16,9 +16,8 @@ from rig_identification.session.topics import DEVICES
 LARGEST_LENGTH = 100.0  # m
 LENGTH_HINT = "is it in mm? lengths are in m"
 _CABLE_KEYS = ("ceiling_point", "body_point", "length", "load_cell")
-_TOP_KEYS = (
-    "gravity", "mass", "mass_std", "frame", "cables", "imu", "inclinometer", "exciter", "mocap", "noise", "tolerance",
-)  # fmt: skip
+_MOUNTS = ("imu", "inclinometer", "exciter", "mocap")
+_TOP_KEYS = ("gravity", "mass", "mass_std", "frame", "cables", *_MOUNTS, "noise", "tolerance")
 
 
 def read_rig(file: Path) -> Rig:
@@ -123,8 +122,8 @@ def _check_closure(top: Fields, cables: tuple[Cable, ...]) -> None:
         if abs(ceiling - body) > 1.01 * reach:
             raise top.fault(
                 other.name,
-                f"no pose holds it and {one.name}: hinges {ceiling:g} m apart at the ceiling and {body:g} m on the "
-                f"body differ by more than both lengths, {reach:g} m; is one of them in mm?",
+                f"no pose holds it and {one.name}: hinges {ceiling:g} m apart at the ceiling and {body:g} m "
+                f"on the body differ by more than both lengths, {reach:g} m; is one of them in mm?",
             )
 
 
@@ -157,7 +156,8 @@ def _check_inertia(fields: Fields, inertia: np.ndarray, mass: float) -> None:
     if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-6):
         raise fields.fault(
             "inertia",
-            f"principal moments {listed} kg m^2: the largest exceeds the sum of the others; check xx xy xz yy yz zz",
+            f"principal moments {listed} kg m^2: the largest exceeds the sum of the others; "
+            "check xx xy xz yy yz zz",
         )
     if moments[2] > mass * LARGEST_LENGTH**2:
         raise fields.fault(

@@ -61,6 +61,8 @@ def select_stamps(stamp_ns: Stamps, received_ns: Stamps) -> StampSelection:
     ordered = [_ordered(stamps, start, end) for start, end in main]
     kept = np.concatenate(ordered) if ordered else np.zeros(0, np.int64)
     in_order = sum(len(_increasing(stamps, start, end)) for start, end in main)
+    if restored := len(kept) - in_order:
+        notes.append(f"{restored} messages came late and were put back in their place")
     return StampSelection(chosen[kept], duplicated, len(stamps) - in_order, tuple(notes))
 
 
@@ -76,7 +78,7 @@ def _near(stamps: Stamps, received: Stamps) -> NDArray[np.bool_]:
         return np.zeros(0, bool)
     span = max(len(stamps) * _median_interval(np.sort(stamps)), float(np.ptp(received)))
     middle = np.partition(stamps, len(stamps) // 2)[len(stamps) // 2]
-    return np.abs(stamps - middle) <= 2.0 * span + 60.0 * _SECOND
+    return np.asarray(np.abs(stamps - middle) <= 2.0 * span + 60.0 * _SECOND)
 
 
 def _receive_usable(stamps: Stamps, received: Stamps) -> bool:

@@ -54,7 +54,9 @@ def expected_topics(
         ``renamed`` has a key that is no topic of this rig, or two topics get one name.
     """
     prefix = "/" + namespace.strip("/") if namespace.strip("/") else ""
-    contract = {f"{cable}/wrench": ("tension", WRENCH, cable) for cable in cables}
+    contract: dict[str, tuple[str, str, str | None]] = {
+        f"{cable}/wrench": ("tension", WRENCH, cable) for cable in cables
+    }
     contract.update({name: (channel, kind, None) for name, (channel, kind) in FIXED_TOPICS.items()})
     names = {name: f"{prefix}/{name}" for name in contract}
     for key, bag_name in (renamed or {}).items():
