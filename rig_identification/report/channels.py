@@ -28,8 +28,7 @@ class ChannelView:
     rms: float
     noise: str  # "2.1 N, from the rig description"
     full: Markup
-    close_up: Markup | None
-    close_up_at: str
+    close_up: Markup | None  # the stretch where the residual is largest
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,6 @@ def _channel_view(fit: ChannelFit, columns: int, *, close_up: bool) -> ChannelVi
         noise=f"{significant(fit.noise_std, 2)} {unit_text(fit.unit)}, {source}",
         full=_chart(fit, (start, end), columns),
         close_up=_chart(fit, where, columns) if close_up else None,
-        close_up_at=f"{where[0]:.1f} s to {where[1]:.1f} s" if close_up else "",
     )
 
 

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig_identification.report.quantity import number, significant, unit_text, value_and_half_width
+from rig_identification.report.quantity import (
+    number,
+    power_of_ten,
+    significant,
+    unit_text,
+    value_and_half_width,
+)
 from rig_identification.report.ten_numbers import Element, elements
 from rig_identification.result import ELEMENTS, Finding, Identification, Mismatch
 
@@ -88,8 +94,14 @@ def _parameter(name: str, entry: Mapping[str, object]) -> tuple[str, str, str, s
         return _words(name), str(entry.get("value", "–")), "", unit
     if std is None:
         return _words(name), significant(value, 4), "", unit
-    if not 1e-3 <= abs(value) < 1e6:
-        return _words(name), significant(value, 4), significant(1.96 * std, 2), unit
+    if value and not 1e-3 <= abs(value) < 1e6:
+        exponent = int(np.floor(np.log10(abs(value))))
+        power = 10.0**exponent
+        return (
+            _words(name),
+            *value_and_half_width(value / power, std / power),
+            f"{power_of_ten(exponent)} {unit}",
+        )
     return _words(name), *value_and_half_width(value, std), unit
 
 

@@ -42,7 +42,7 @@ def ticks(lower: float, upper: float, count: int) -> list[float]:
         return []
     raw = span / max(count, 1)
     power = 10.0 ** np.floor(np.log10(raw))
-    step = power * next(m for m in (1.0, 2.0, 5.0, 10.0) if m * power >= 0.7 * raw)
+    step = power * next(m for m in (1.0, 2.0, 5.0, 10.0) if m * power >= 0.6 * raw)
     first = np.ceil(lower / step - 1e-9)
     last = np.floor(upper / step + 1e-9)
     return [float(k * step) for k in np.arange(first, last + 1)]

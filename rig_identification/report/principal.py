@@ -37,7 +37,7 @@ def principal_inertia(estimate: InertialEstimate) -> PrincipalInertia | None:
         return None
     moments, axes = np.linalg.eigh(inertia_matrix(estimate.values))
     largest: Array = axes[np.argmax(np.abs(axes), axis=0), np.arange(3)]
-    axes = axes * np.sign(largest)
+    axes = np.asarray(axes * np.sign(largest))
     covariance = estimate.covariance[4:, 4:]
     slopes = np.array([[_slope(axes[:, i], axes[:, j]) for j in range(3)] for i in range(3)])
     margin_slope = slopes[0, 0] + slopes[1, 1] - slopes[2, 2]
@@ -60,7 +60,7 @@ def _slope(left: Array, right: Array) -> Array:
 
 
 def _std(slope: Array, covariance: Array) -> float:
-    return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
 
 
 def _tilt_std(axis: int, moments: Array, slopes: Array, covariance: Array) -> float:

@@ -32,9 +32,14 @@ def significant(value: float, digits: int = 3) -> str:
         return "–"
     if value != 0.0 and not 1e-3 <= abs(value) < 1e5:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}×10".replace("-", "−") + str(int(exponent)).translate(SUPERSCRIPT)
+        return mantissa.replace("-", "−") + power_of_ten(int(exponent))
     places = 0 if value == 0.0 else max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
     return number(value, places)
+
+
+def power_of_ten(exponent: int) -> str:
+    """The factor ``×10⁶`` of a number."""
+    return "×10" + str(exponent).translate(SUPERSCRIPT)
 
 
 def value_and_half_width(value: float, std: float) -> tuple[str, str]:

@@ -84,7 +84,7 @@ def _distribution(summary: ResidualSummary, label: str) -> Markup:
         height=HEIGHT,
         limits=(0.0, 1.1 * max(0.4, float(summary.density.max()))),
     )
-    return _small(panel, (-5.0, 5.0), "σ", f"{label}: distribution")
+    return _small(panel, (-5.0, 5.0), f"{label}: distribution")
 
 
 def _spectrum(summary: ResidualSummary, label: str) -> Markup:
@@ -102,7 +102,7 @@ def _spectrum(summary: ResidualSummary, label: str) -> Markup:
         log=True,
     )
     limits = (float(summary.frequency[0]), float(summary.frequency[-1]))
-    return _small(panel, limits, "Hz", f"{label}: spectrum", x_log=True)
+    return _small(panel, limits, f"{label}: spectrum", x_log=True)
 
 
 def _correlation(summary: ResidualSummary, label: str) -> Markup:
@@ -114,10 +114,8 @@ def _correlation(summary: ResidualSummary, label: str) -> Markup:
         limits=(lowest, highest),
         bands=((-summary.white_band, summary.white_band, "band"),),
     )
-    return _small(panel, (0.0, float(summary.lag[-1])), "s", f"{label}: autocorrelation")
+    return _small(panel, (0.0, float(summary.lag[-1])), f"{label}: autocorrelation")
 
 
-def _small(
-    panel: Panel, limits: tuple[float, float], unit: str, title: str, *, x_log: bool = False
-) -> Markup:
-    return Markup(chart_svg([panel], x_limits=limits, x_label=unit, title=title, width=WIDTH, x_log=x_log))
+def _small(panel: Panel, limits: tuple[float, float], title: str, *, x_log: bool = False) -> Markup:
+    return Markup(chart_svg([panel], x_limits=limits, x_label="", title=title, width=WIDTH, x_log=x_log))

@@ -73,7 +73,8 @@ def _spectrum(residual: Array, interval: float) -> tuple[Array, Array]:
         return np.empty(0), np.empty(0)
     length = min(len(residual), max(16, min(4096, len(residual) // 4)))
     frequency, density = signal.welch(residual, fs=1.0 / interval, nperseg=length, detrend=False)
-    return _log_average(frequency[1:], density[1:] / (2.0 * interval))
+    inner = slice(1, -1)  # zero and the highest frequency are scaled otherwise
+    return _log_average(frequency[inner], density[inner] / (2.0 * interval))
 
 
 def _log_average(frequency: Array, power: Array, per_decade: int = 24) -> tuple[Array, Array]:

@@ -32,12 +32,12 @@ _COS, _SIN = np.cos(np.radians(35.0)), np.sin(np.radians(35.0))
 _TILT = np.radians(22.0)
 VIEWS = (
     View(
-        "Isometric",
+        "In space",
         np.array([[_COS, _SIN, 0.0], [-_SIN * np.sin(_TILT), _COS * np.sin(_TILT), np.cos(_TILT)]]),
     ),
-    View("From above (x, y)", np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])),
-    View("From the side (x, z)", np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])),
-    View("From the end (y, z)", np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])),
+    View("From above: x to the right, y up", np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])),
+    View("From the side: x to the right, z up", np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])),
+    View("From the end: y to the right, z up", np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])),
 )
 
 
