@@ -65,19 +65,16 @@ def draw_scene(seed: int, duration: float) -> Scene:
     return Scene(seed, name, rig, body, geometry, devices, errors, plans)
 
 
-def gentler(scene: Scene, share: float = 0.55) -> Scene:
-    """The same scene with less force and less displacement: no cable may come near slack by itself."""
-    plans = []
-    for plan in scene.plans:
-        if plan.motor is not None:
-            plan = replace(
-                plan,
-                start="pull" if plan.start == "thesis" else plan.start,
-                pull=share * plan.pull,
-                motor=replace(plan.motor, unbalance=share * plan.motor.unbalance),
-            )
-        plans.append(plan)
-    return replace(scene, plans=tuple(plans))
+def scaled(plan: Plan, share: float) -> Plan:
+    """The same run with ``share`` of its force and of its displacement; released aside, not from level."""
+    if plan.motor is None:
+        return plan
+    return replace(
+        plan,
+        start="pull" if plan.start == "thesis" else plan.start,
+        pull=share * plan.pull,
+        motor=replace(plan.motor, unbalance=share * plan.motor.unbalance),
+    )
 
 
 def _four_cables(rng: np.random.Generator, name: str) -> tuple[Geometry, Body]:
@@ -85,11 +82,8 @@ def _four_cables(rng: np.random.Generator, name: str) -> tuple[Geometry, Body]:
     splay = rng.uniform(0.9, 1.1, 2)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dtype=float)
     hinge = corners * [*body_size, 0.0] + rng.normal(0.0, 0.01, (4, 3))
-    middle = np.array([*body_size, 0.0]) / 2.0 + np.array(first)
     ceiling = (corners - [0.5, 0.5, 0.0]) * [ceiling_size[0] * splay[0], ceiling_size[1] * splay[1], 0.0]
-    ceiling = ceiling + [ceiling_size[0] / 2.0, ceiling_size[1] / 2.0, 0.0]
-    ceiling = ceiling + rng.normal(0.0, 0.01, (4, 3))
-    del middle
+    ceiling = ceiling + np.array([*ceiling_size, 0.0]) / 2.0 + rng.normal(0.0, 0.01, (4, 3))
     # Lengths such that the level pose of the thesis fits: it is a start that the cables allow.
     length = np.linalg.norm(np.array(first) + hinge - ceiling, axis=1)
     cells = tuple(str(rng.choice(["ceiling", "body"], p=[0.8, 0.2])) for _ in range(4))
@@ -119,11 +113,8 @@ def _draw_body(rng: np.random.Generator, mass: float, center: Array, inertia: tu
     scale = rng.uniform(0.88, 1.12, 3)
     tensor = np.diag([xx * scale[0], yy * scale[1], zz * scale[2]]).astype(float)
     xz = rng.normal(0.0, 0.02 * np.sqrt(xx * zz))
-    for (a, b), value in {
-        (0, 1): rng.normal(0.0, 0.01 * xx),
-        (0, 2): xz,
-        (1, 2): yz * rng.uniform(0.3, 1.3),
-    }.items():
+    products = {(0, 1): rng.normal(0.0, 0.01 * xx), (0, 2): xz, (1, 2): yz * rng.uniform(0.3, 1.3)}
+    for (a, b), value in products.items():
         tensor[a, b] = tensor[b, a] = value
     principal = np.linalg.eigvalsh(tensor)
     if principal[0] <= 0.0 or principal[0] + principal[1] < 1.02 * principal[2]:
@@ -179,7 +170,7 @@ def _describe(rng: np.random.Generator, geometry: Geometry, body: Body, devices:
     frame = None
     if rng.random() < 0.5:
         share = 0.15 * body.inertia * rng.uniform(0.6, 1.0)
-        center = np.round(body.center_of_mass + [0.05, 0.1, 0.25], 2)
+        center = np.round(body.center_of_mass + np.array([0.05, 0.1, 0.25]), 2)
         frame = CarryingFrame(float(np.round(0.14 * body.mass)), center, np.diag(np.round(np.diag(share))))
     return Rig(
         gravity=GRAVITY,
@@ -219,48 +210,41 @@ def _draw_plans(
 ) -> tuple[Plan, ...]:
     dummy = np.round([*rng.uniform(0.1, 0.9, 2) * geometry.hinge[:, :2].max(axis=0), -0.25], 3)
     dummy_mass = float(np.round(0.045 * body.mass))
-    first = "thesis" if len(geometry.length) == 4 and rng.random() < 0.4 else "pull"
+    splayed = len(geometry.length) == 4
+    first = "thesis" if splayed and rng.random() < 0.4 else "pull"
     plans = [
         Plan("static_bare", "static", 10.0),
         Plan("static_dummy", "static", 10.0, dummy_mass=dummy_mass, dummy_position=dummy),
     ]
     for name, start, share in (("run_1", first, 1.0), ("run_2", "pull2", 0.7)):
         # Four splayed cables hold the body harder than three: the same motion needs more pull.
-        pull = share * (rng.uniform(0.05, 0.1) if len(geometry.length) == 4 else rng.uniform(0.03, 0.06))
-        plans.append(_draw_run(rng, body, duration, name, start, share, pull))
+        pull = share * (rng.uniform(0.05, 0.1) if splayed else rng.uniform(0.03, 0.06))
+        heading = rng.uniform(0.0, 2.0 * np.pi)
+        plans.append(
+            Plan(
+                name,
+                "dynamic",
+                duration,
+                holdout=name == "run_2",
+                start=start,
+                pull=pull * body.mass * GRAVITY * np.array([np.cos(heading), np.sin(heading), 0.0]),
+                pull_point=body.center_of_mass + rng.normal(0.0, 0.4, 3),
+                motor=_draw_motor(rng, share * body.mass * rng.uniform(0.08, 0.2)),
+                first_sample=float(np.round(rng.uniform(0.005, 0.04), 3)),
+            )
+        )
     return tuple(plans)
 
 
-def _draw_run(
-    rng: np.random.Generator,
-    body: Body,
-    duration: float,
-    name: str,
-    start: str,
-    share: float,
-    pull_share: float,
-) -> Plan:
-    frequency = rng.uniform(0.75, 2.1)
-    amplitude = share * body.mass * rng.uniform(0.08, 0.2)  # N at the set frequency
-    heading = rng.uniform(0.0, 2.0 * np.pi)
-    pull = pull_share * body.mass * GRAVITY * np.array([np.cos(heading), np.sin(heading), 0.0])
-    motor = Motor(
-        frequency=float(np.round(frequency, 2)),
-        unbalance=float(amplitude / (2.0 * np.pi * frequency) ** 2),
+def _draw_motor(rng: np.random.Generator, force: float) -> Motor:
+    """A motor that gives ``force`` (N) at its set frequency."""
+    frequency = float(np.round(rng.uniform(0.75, 2.1), 2))
+    return Motor(
+        frequency=frequency,
+        unbalance=force / (2.0 * np.pi * frequency) ** 2,
         ramp=rng.uniform(3.0, 6.0),
         wobble=rng.uniform(0.01, 0.04),
         wobble_period=rng.uniform(15.0, 30.0),
-    )
-    return Plan(
-        name,
-        "dynamic",
-        duration,
-        holdout=name == "run_2",
-        start=start,
-        pull=pull,
-        pull_point=body.center_of_mass + rng.normal(0.0, 0.4, 3),
-        motor=motor,
-        first_sample=float(np.round(rng.uniform(0.005, 0.04), 3)),
     )
 
 

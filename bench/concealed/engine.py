@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from bench.concealed.effects.base import Effect, State
+from bench.concealed.kinematics import predict, put_body_force
 from bench.concealed.scene import Array, Plan, Scene
 
 STEP = 0.0005  # s
@@ -48,6 +49,9 @@ class Engine:
         self.forcing = [e for e in self.effects if type(e).force is not Effect.force]
         self.model = self._compile()
         self.data = mujoco.MjData(self.model)
+        # Views into MuJoCo's own arrays: asking for them anew at every step costs more than the step.
+        self._pose, self._velocity = self.data.qpos, self.data.qvel
+        self._acceleration, self._applied = self.data.qacc, self.data.qfrc_applied
         self.cables = len(scene.geometry.length)
         self._adjust_lengths()
 
@@ -70,11 +74,10 @@ class Engine:
         for i, (top, hinge) in enumerate(zip(scene.geometry.ceiling, scene.geometry.hinge, strict=True)):
             spec.worldbody.add_site(name=f"ceiling_{i}", pos=top)
             body.add_site(name=f"hinge_{i}", pos=hinge)
-        rigid = True
-        for effect in self.effects:
-            rigid = effect.build(spec, scene, plan) and rigid
-        if rigid:
+        if not any(effect.own_cables for effect in self.effects):
             add_cables(spec, scene)
+        for effect in self.effects:
+            effect.build(spec, scene, plan)
         return spec.compile()
 
     def _adjust_lengths(self) -> None:
@@ -85,31 +88,21 @@ class Engine:
                 tendon = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_TENDON, f"cable_{i}")
                 self.model.eq_data[row, 0] = length - self.model.tendon_length0[tendon]
 
-    def state(self, time: float, ahead: float = 0.0) -> State:
-        """Motion of the body now, or ``ahead`` seconds on to second order."""
-        velocity = self.data.qvel + ahead * self.data.qacc
-        pose = self.data.qpos
-        if ahead:
-            pose = pose.copy()
-            mujoco.mj_integratePos(self.model, pose, 0.5 * (velocity + self.data.qvel), ahead)
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, pose[3:7])
-        return State(time, pose[:3], rotation.reshape(3, 3), velocity[:3], velocity[3:6], self.data, pose)
-
     def load(self, time: float, force: Array, ahead: float = 0.0, hold: float = 0.0) -> None:
-        """Apply the exciter's ``force`` (exciter frame), the effects and ``hold`` times the start pull."""
-        state = self.state(time, ahead)
-        applied = self.data.qfrc_applied
-        applied[:] = 0.0
-        devices = self.scene.devices
-        force_body = devices.exciter_rotation @ force
-        applied[:3] = state.rotation @ force_body
-        applied[3:6] = _cross(devices.exciter_position, force_body)
+        """Apply the exciter's ``force`` (body axes), the effects and ``hold`` times the start pull.
+
+        ``ahead``: seconds from the engine's state to the instant that counts.
+        """
+        pose, applied = self._pose, self._applied
+        position, rotation, velocity, rate = predict(pose, self._velocity, self._acceleration, ahead)
+        put_body_force(applied, rotation, force, self.scene.devices.exciter_position)
         if hold:
             applied[:3] += hold * self.plan.pull
-            applied[3:6] += hold * _cross(self.plan.pull_point, state.rotation.T @ self.plan.pull)
-        for effect in self.forcing:
-            applied[:6] += effect.force(state)
+            applied[3:6] += hold * np.cross(self.plan.pull_point, rotation.T @ self.plan.pull)
+        if self.forcing:
+            state = State(time, position, rotation, velocity, rate)
+            for effect in self.forcing:
+                applied[:6] += effect.force(state)
 
     def rest(self, hold: float = 0.0) -> float:
         """Move to equilibrium: damped motion first, then Newton's method; return the acceleration left."""
@@ -220,14 +213,15 @@ class Engine:
         else:
             angle, rate = motor.shaft(half)
             shaft, force = np.stack([angle, rate], axis=1), motor.force(angle, rate)
+        force_body = np.ascontiguousarray(force @ self.scene.devices.exciter_rotation.T)
         rows = []
         for k in range(steps + 1):
             time = k * STEP
             if k % RECORD_EVERY == 0:
-                self.load(time, force[2 * k])
+                self.load(time, force_body[2 * k])
                 mujoco.mj_forward(self.model, self.data)
                 rows.append(self._row())
-            self.load(time + 0.5 * STEP, force[2 * k + 1], ahead=0.5 * STEP)
+            self.load(time + 0.5 * STEP, force_body[2 * k + 1], ahead=0.5 * STEP)
             mujoco.mj_step(self.model, self.data)
         kept = slice(0, 2 * steps + 1, 2 * RECORD_EVERY)
         return self._trajectory(np.array(rows), shaft[kept], force[kept])
@@ -257,7 +251,7 @@ class Engine:
             tension = effect.tension(self.model, self.data, self.scene)
             if tension is not None:
                 return tension
-        return cable_tension(self.model, self.data, self.cables)
+        return cable_tension(self.data, self.cables)
 
     def _trajectory(self, rows: Array, shaft: Array, force: Array) -> Trajectory:
         n = self.cables
@@ -277,7 +271,7 @@ class Engine:
         )
 
 
-def add_cables(spec: mujoco.MjSpec, scene: Scene, **tendon_options: object) -> None:
+def add_cables(spec: mujoco.MjSpec, scene: Scene) -> None:
     """Add the rigid cables."""
     for i in range(len(scene.geometry.length)):
         tendon = spec.add_tendon(name=f"cable_{i}")
@@ -292,15 +286,10 @@ def add_cables(spec: mujoco.MjSpec, scene: Scene, **tendon_options: object) -> N
         )
 
 
-def cable_tension(model: mujoco.MjModel, data: mujoco.MjData, cables: int) -> Array:
+def cable_tension(data: mujoco.MjData, cables: int) -> Array:
     """(cables,) force of the tendon equalities, positive when they pull."""
-    tension = np.zeros(cables)
-    rows = np.flatnonzero(data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
-    for row in rows:
-        name = model.equality(data.efc_id[row]).name
-        if name.startswith("cable_"):
-            tension[int(name[6:])] = -data.efc_force[row]
-    return tension
+    # MuJoCo lists equalities first, in the order they were added: an effect's own come after the cables.
+    return np.asarray(-data.efc_force[:cables])
 
 
 def _give_mass(body: mujoco.MjsBody, mass: float, center: Array, inertia: Array) -> None:
@@ -309,7 +298,3 @@ def _give_mass(body: mujoco.MjsBody, mass: float, center: Array, inertia: Array)
     body.ipos = center
     j = inertia
     body.fullinertia = [j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]]
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

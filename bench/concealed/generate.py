@@ -5,22 +5,24 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bench.concealed import truth as truths
-from bench.concealed.draw import draw_scene, gentler
+from bench.concealed.draw import draw_scene, scaled
 from bench.concealed.effects import draw_effects
 from bench.concealed.effects.base import Effect
 from bench.concealed.engine import Engine, Trajectory
 from bench.concealed.measure import device_samples, record
-from bench.concealed.scene import Scene
+from bench.concealed.scene import Plan, Scene
 from rig_identification.recording import Session
 
 LEAST_TENSION = 0.02  # of the weight: clean scenes stay clear of slack cables by this
 MOST_RATE = 0.8  # rad/s
+LEAST_RANGE = 0.035  # m, of the body origin
 
 
 def make_session(
@@ -32,14 +34,7 @@ def make_session(
     ``size``: 0 (faint) to 1 (strong); None draws it. ``duration`` of each run in s.
     The same arguments give the same session, bit for bit, on the same machine.
     """
-    ideal = draw_scene(seed, duration)
-    for _ in range(6):
-        paths = simulate(ideal, [])
-        if all(map(_calm, [ideal] * len(paths), paths)):
-            break
-        ideal = gentler(ideal)
-    else:
-        raise RuntimeError(f"seed {seed}: no calm enough motion found")
+    ideal, paths = _calm_scene(draw_scene(seed, duration))
     effects = draw_effects(np.random.default_rng([seed, 3]), ideal, kind, size)
     scene = ideal
     for effect in effects:
@@ -58,14 +53,42 @@ def make_session(
 
 def simulate(scene: Scene, effects: Sequence[Effect]) -> list[Trajectory]:
     """True motion of every recording of the scene."""
-    paths = []
+    return [_simulate_one(scene, effects, plan) for plan in scene.plans]
+
+
+def _simulate_one(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Trajectory:
+    engine = Engine(scene, effects, plan)
+    residual = engine.release()
+    if not residual < 1e-6:
+        raise RuntimeError(f"seed {scene.seed}, {plan.name}: start not found, residual {residual:.2g}")
+    return engine.run() if plan.kind == "dynamic" else engine.stand()
+
+
+def _calm_scene(scene: Scene) -> tuple[Scene, list[Trajectory]]:
+    """Scale each run until its cables stay clear of slack and its motion is worth recording."""
+    plans, paths = [], []
     for plan in scene.plans:
-        engine = Engine(scene, effects, plan)
-        residual = engine.release()
-        if not residual < 1e-6:
-            raise RuntimeError(f"seed {scene.seed}, {plan.name}: start not found, residual {residual:.2g}")
-        paths.append(engine.run() if plan.kind == "dynamic" else engine.stand())
-    return paths
+        for _ in range(8):
+            path = _simulate_one(scene, [], plan)
+            share = _share(scene, path)
+            if share == 1.0:
+                break
+            plan = scaled(plan, share)
+        else:
+            raise RuntimeError(f"seed {scene.seed}, {plan.name}: no fitting motion found")
+        plans.append(plan)
+        paths.append(path)
+    return replace(scene, plans=tuple(plans)), paths
+
+
+def _share(scene: Scene, path: Trajectory) -> float:
+    """By what to scale a run: 1 if it is good as it is."""
+    weight = scene.body.mass * scene.rig.gravity
+    if path.tension.min() < LEAST_TENSION * weight or np.abs(path.rate).max() > MOST_RATE:
+        return 0.6
+    # At rest by design, or moving enough to tell an inertia.
+    still = np.ptp(path.position, axis=0).max() == 0.0
+    return 1.0 if still or np.ptp(path.position, axis=0).max() > LEAST_RANGE else 1.5
 
 
 def effect_over_noise(
@@ -75,7 +98,7 @@ def effect_over_noise(
     paths: Sequence[Trajectory],
     effects: Sequence[Effect],
 ) -> dict[str, dict[str, float]]:
-    """By recording and channel: root mean square of what the effects change, in units of one sample's noise."""
+    """By recording and channel: rms of what the effects change, in units of one sample's noise."""
     if not effects:
         return {}
     out = {}
@@ -84,11 +107,6 @@ def effect_over_noise(
         other = device_samples(paths[k], scene, effects, plan, k, noise=0.0)
         out[plan.name] = truths.channel_differences(clean, other, scene)
     return out
-
-
-def _calm(scene: Scene, path: Trajectory) -> bool:
-    weight = scene.body.mass * scene.rig.gravity
-    return bool(path.tension.min() > LEAST_TENSION * weight and np.abs(path.rate).max() < MOST_RATE)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

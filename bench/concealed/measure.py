@@ -158,7 +158,7 @@ def record(
 
 def _rows(time: Array, plan: Plan, schedule: tuple[int, int]) -> Array:
     offset, interval = schedule
-    begin = int(round(1000.0 * plan.first_sample)) + offset
+    begin = round(1000.0 * plan.first_sample) + offset
     return np.arange(begin, len(time), interval)
 
 

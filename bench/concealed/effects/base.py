@@ -24,8 +24,6 @@ class State:
     rotation: Array  # (3, 3) body to world
     velocity: Array  # (3,) m/s, body origin, world
     rate: Array  # (3,) rad/s, body
-    data: Any  # MuJoCo's data, for parts that an effect added
-    pose: Array  # (nq,) all coordinates
 
     def point(self, position: Array) -> tuple[Array, Array]:
         """World position (3,) and velocity (3,) of a point given in body coordinates."""
@@ -43,6 +41,7 @@ class Effect:
 
     name = ""  # a word of the contract's table, or of its own for one from outside
     outside = False  # not in the contract's table
+    own_cables = False  # the effect replaces the rigid cables by its own
     mechanical = False  # the motion changes, not only what is read
 
     @classmethod
@@ -58,9 +57,8 @@ class Effect:
         """The scene as it truly is; the description stays as it was."""
         return scene
 
-    def build(self, spec: Any, scene: Scene, plan: Plan) -> bool:
-        """Add bodies to the mechanism; return False if the cables were added here too."""
-        return True
+    def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
+        """Add to the mechanism: bodies, springs, and the cables themselves if they are :attr:`own_cables`."""
 
     def tension(self, model: Any, data: Any, scene: Scene) -> Array | None:
         """(cables,) N at the load cells if the mechanism's cables are this effect's own, else None."""
