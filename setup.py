@@ -45,7 +45,7 @@ setup(
         "jinja2>=3.1",
         "numba>=0.59",
         "numpy>=1.24",
-        "PyYAML>=6.0",
+        "ruamel.yaml>=0.18",
         "rich>=13.0",
         "rosbags>=0.10",
         "scipy>=1.11",
@@ -53,7 +53,7 @@ setup(
     extras_require={
         "ros": [f"ros-jazzy-rclpy[fastrtps]{ROS_WHEELS}", f"ros-jazzy-common-interfaces{ROS_WHEELS}"],
         "test": ["hypothesis>=6.90", "pytest>=8.0", "ruff>=0.9"],
-        "dev": ["mujoco>=3.1", "mypy>=1.10", "ruff>=0.9", "types-PyYAML"],
+        "dev": ["mujoco>=3.1", "mypy>=1.10", "ruff>=0.9"],
     },
     entry_points={"console_scripts": ["rig-identification = rig_identification.cli.main:main", *NODES]},
 )

@@ -1,0 +1,99 @@
+"""``rig-identification``: finds the command, and turns errors into one line and an exit status."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import io
+import pkgutil
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import NoReturn
+
+from rig_identification import __version__
+from rig_identification.cli import commands
+from rig_identification.errors import InputError
+
+PROGRAM = "rig-identification"
+
+SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong with the arguments in one line, like every other error."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and leave."""
+        self.exit(UNUSABLE, f"{PROGRAM}: error: {message}; see {self.prog} --help\n")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Parser of every command found in ``cli/commands``."""
+    parser = OneLineParser(
+        prog=PROGRAM,
+        description="Mass, centre of mass and inertia tensor of a body on a cable rig, "
+        "and what the rig's model left out.",
+    )
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
+    for found in sorted(pkgutil.iter_modules(commands.__path__), key=lambda module: module.name):
+        command = importlib.import_module(f"{commands.__name__}.{found.name}")
+        summary, _, details = (command.__doc__ or "").partition("\n")
+        subparser = subparsers.add_parser(
+            found.name,
+            help=summary,
+            description=summary,
+            epilog=details.strip(),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.configure(subparser)
+        subparser.add_argument(
+            "--debug", action="store_true", help="show where a defect of this package lies"
+        )
+        subparser.set_defaults(run=command.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns
+    -------
+    int
+        0; 1 for a defect of this package; 2 for input that cannot be used; 130 where the user interrupted.
+    """
+    _accept_any_terminal()
+    arguments = build_parser().parse_args(argv)
+    try:
+        arguments.run(arguments)
+    except InputError as error:
+        _say(f"error: {error}")
+        return UNUSABLE
+    except KeyboardInterrupt:
+        _say("interrupted; nothing was written")
+        return INTERRUPTED
+    except Exception as error:
+        if arguments.debug:
+            traceback.print_exc()
+        _say(f"defect: {type(error).__name__}: {error}. Please report it, with the output of --debug")
+        return DEFECT
+    return SUCCESS
+
+
+def _say(message: str) -> None:
+    """One line, whatever the message holds."""
+    print(f"{PROGRAM}: {' '.join(message.split())}", file=sys.stderr)
+
+
+def _accept_any_terminal() -> None:
+    """A terminal without ± must not turn a result into an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            with contextlib.suppress(io.UnsupportedOperation):
+                stream.reconfigure(errors="replace")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
