@@ -1,0 +1,151 @@
+"""A run as the estimator sees it: grid, input, and the samples of every channel with their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rig_identification.estimate.sampling import Grid, group_by_node, white_noise_std
+from rig_identification.recording import Recording, Series
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+#: Node spacing of runs up to LONG_RUN seconds, and of longer ones.
+NODE_STEP = 0.005
+LONG_NODE_STEP = 0.01
+LONG_RUN = 150.0
+#: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).
+MARGIN = 0.02
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Samples of one device quantity, grouped by node."""
+
+    device: str  # cable name, "imu", "inclinometer" or "mocap"
+    quantity: str
+    columns: slice  # of the device's reading (model/sensors.py)
+    unit: str
+    time: Array  # (n,) s, device clock
+    values: Array  # (n, w)
+    noise: Array  # (w,) standard deviation of one sample
+    noise_estimated: bool
+    group: Index  # (n,)
+    node: Index  # (groups,)
+
+    @property
+    def width(self) -> int:
+        """Number of axes."""
+        return int(self.values.shape[1])
+
+    @property
+    def grouped(self) -> Array:
+        """(groups, w) mean of each group."""
+        count = np.bincount(self.group)
+        return np.stack([np.bincount(self.group, v) / count for v in self.values.T], axis=1)
+
+    @property
+    def grouped_variance(self) -> Array:
+        """(groups, w) variance of each group's mean."""
+        return np.asarray(self.noise**2 / np.bincount(self.group)[:, None])
+
+
+@dataclass(frozen=True)
+class Run:
+    """One dynamic recording, ready to be fitted."""
+
+    recording: Recording
+    grid: Grid
+    channels: tuple[Channel, ...]
+    exciter: Series | None
+    exciter_noise: float  # N, one sample
+    exciter_rate: float  # Hz
+    R_tracker_mean: Array | None = None  # (3, 3) see sensors.MocapMount
+
+    def until(self, end: float) -> Run:
+        """The same run, cut off at ``end`` seconds."""
+        nodes = min(self.grid.nodes, max(8, int(round(end / self.grid.step)) + 1))
+        grid = replace(self.grid, nodes=nodes)
+        cut = []
+        for channel in self.channels:
+            inside = channel.time <= grid.duration - MARGIN
+            if np.count_nonzero(inside) < 5:
+                continue
+            group, node = group_by_node(grid, channel.time[inside])
+            cut.append(
+                replace(
+                    channel, time=channel.time[inside], values=channel.values[inside], group=group, node=node
+                )
+            )
+        return replace(self, grid=grid, channels=tuple(cut))
+
+
+def _noise(rig: Rig, name: str, values: Array) -> tuple[Array, bool]:
+    width = values.shape[1]
+    if name in rig.noise:
+        return np.full(width, rig.noise[name]), False
+    pooled = np.sqrt(np.mean(white_noise_std(values) ** 2))
+    return np.full(width, max(float(pooled), 1e-9)), True
+
+
+def _channel(
+    rig: Rig, grid: Grid, device: str, quantity: str, unit: str, noise: str, series: Series, columns: slice
+) -> Channel | None:
+    inside = (series.time >= MARGIN) & (series.time <= grid.duration - MARGIN)
+    if np.count_nonzero(inside) < 5:
+        return None
+    time, values = series.time[inside], series.values[inside]
+    std, estimated = _noise(rig, noise, values)
+    group, node = group_by_node(grid, time)
+    return Channel(device, quantity, columns, unit, time, values, std, estimated, group, node)
+
+
+def _mocap_series(series: Series) -> tuple[Series, Array]:
+    """Pose as position and rotation vector about the mean orientation, and that mean (3, 3)."""
+    turns = Rotation.from_quat(series.values[:, 3:])
+    mean = turns.mean()
+    about_mean = (mean.inv() * turns).as_rotvec()
+    return Series(series.time, np.concatenate([series.values[:, :3], about_mean], axis=1)), mean.as_matrix()
+
+
+def prepare(rig: Rig, recording: Recording) -> Run:
+    """Everything of a dynamic recording that a fit needs."""
+    step = NODE_STEP if recording.duration <= LONG_RUN else LONG_NODE_STEP
+    grid = Grid(step, int(np.floor(recording.duration / step)) + 1)
+    found: list[Channel | None] = []
+    for cable, series in recording.tension.items():
+        found.append(_channel(rig, grid, cable, "tension", "N", "tension", series, slice(0, 1)))
+    if recording.imu is not None and rig.imu is not None:
+        series = recording.imu
+        gyro, accel = Series(series.time, series.values[:, :3]), Series(series.time, series.values[:, 3:])
+        found.append(_channel(rig, grid, "imu", "angular_rate", "rad/s", "angular_rate", gyro, slice(0, 3)))
+        found.append(
+            _channel(rig, grid, "imu", "specific_force", "m/s^2", "specific_force", accel, slice(3, 6))
+        )
+    if recording.inclination is not None and rig.inclinometer is not None:
+        series = recording.inclination
+        found.append(
+            _channel(rig, grid, "inclinometer", "inclination", "rad", "inclination", series, slice(0, 2))
+        )
+    mean = None
+    if recording.mocap is not None:
+        series, mean = _mocap_series(recording.mocap)
+        place, turn = Series(series.time, series.values[:, :3]), Series(series.time, series.values[:, 3:])
+        found.append(_channel(rig, grid, "mocap", "position", "m", "mocap_position", place, slice(0, 3)))
+        found.append(
+            _channel(rig, grid, "mocap", "orientation", "rad", "mocap_orientation", turn, slice(3, 6))
+        )
+    exciter = recording.exciter_force if rig.exciter is not None else None
+    noise, rate = 0.0, 1.0
+    if exciter is not None and exciter.time.size > 8:
+        noise = float(_noise(rig, "exciter_force", exciter.values)[0][0])
+        rate = 1.0 / float(np.median(np.diff(exciter.time)))
+    else:
+        exciter = None
+    return Run(recording, grid, tuple(c for c in found if c is not None), exciter, noise, rate, mean)
+

@@ -1,0 +1,284 @@
+"""The one place that maps named free parameters to the optimiser's vector and to the model's numbers.
+
+Every doubt about the rig is a parameter with the description's value and tolerance as its
+Gaussian prior. The optimiser sees each in units of its tolerance, so that its vector is
+dimensionless and of order one; the ten inertial parameters come first, in log-Cholesky
+form (model/body.py), with no prior of their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.model import layout
+from rig_identification.model import sensors as devices
+from rig_identification.model.body import (
+    complex_step_jacobian,
+    elements_from_linear,
+    linear_from_elements,
+    linear_from_log_cholesky,
+    log_cholesky_from_linear,
+)
+from rig_identification.model.integrate import EXCITER_CLOCK
+from rig_identification.model.motion import RigModel
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+INERTIAL = 10
+AXES = "xyz"
+
+# Devices and where their numbers start in the flat array ``device`` (see DeviceLayout)
+CLOCK = "clock"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One free number beside the inertial ones."""
+
+    name: str  # "cable_1.length", "imu.gyroscope_bias.x", ...
+    unit: str
+    nominal: float  # what the description says
+    prior_std: float  # what the lab believes
+    kind: str  # "physics": entry of the model's flat array; "device": entry of DeviceLayout's
+    index: int
+
+
+@dataclass(frozen=True)
+class DeviceLayout:
+    """Where each device's own numbers stand in one flat array."""
+
+    cables: tuple[str, ...]
+
+    @property
+    def load_cells(self) -> int:
+        """First entry of the load cells: gain error and zero of each."""
+        return 0
+
+    @property
+    def imu(self) -> int:
+        """First entry of the IMU: 18 numbers (model/sensors.py), then its clock offset."""
+        return devices.LOAD_CELL_SIZE * len(self.cables)
+
+    @property
+    def inclinometer(self) -> int:
+        """First entry of the inclinometer: 3 numbers, then its clock offset."""
+        return self.imu + devices.IMU_SIZE + 1
+
+    @property
+    def mocap(self) -> int:
+        """First entry of motion capture: 12 numbers, then its clock offset."""
+        return self.inclinometer + devices.INCLINOMETER_SIZE + 1
+
+    @property
+    def exciter_clock(self) -> int:
+        """Entry of the exciter's clock offset."""
+        return self.mocap + devices.MOCAP_SIZE + 1
+
+    @property
+    def size(self) -> int:
+        """Length of the flat array."""
+        return self.exciter_clock + 1
+
+    def clock(self, device: str) -> int | None:
+        """Entry of a device's clock offset; None for the load cells, which keep the time."""
+        return {
+            "imu": self.imu + devices.IMU_SIZE,
+            "inclinometer": self.inclinometer + devices.INCLINOMETER_SIZE,
+            "mocap": self.mocap + devices.MOCAP_SIZE,
+            "exciter": self.exciter_clock,
+        }.get(device)
+
+
+#: A mount that the description leaves out: position within 10 m, orientation within 1.5 rad.
+UNKNOWN_POSITION = 10.0
+UNKNOWN_ROTATION = 1.5
+
+
+@dataclass
+class _Collector:
+    parameters: list[Parameter] = field(default_factory=list)
+
+    def physics(self, name: str, unit: str, nominal: float, std: float, index: int) -> None:
+        self.parameters.append(Parameter(name, unit, float(nominal), std, "physics", index))
+
+    def device(self, name: str, unit: str, std: float, index: int) -> None:
+        self.parameters.append(Parameter(name, unit, 0.0, std, "device", index))
+
+
+def _rig_parameters(c: _Collector, rig: Rig, model: RigModel) -> None:
+    tolerance = rig.tolerance
+    for i, cable in enumerate(rig.cables):
+        o = layout.cable_offset(i)
+        for a in range(3):
+            for end, start, point in (
+                ("ceiling_point", layout.CEILING_POINT, cable.ceiling_point),
+                ("body_point", layout.BODY_POINT, cable.body_point),
+            ):
+                name = f"{cable.name}.{end}.{AXES[a]}"
+                c.physics(name, "m", point[a], tolerance["hinge_position"], o + start + a)
+        c.physics(f"{cable.name}.length", "m", cable.length, tolerance["cable_length"], o + layout.LENGTH)
+    for a in range(2):
+        # Ceiling tilted by t about the axis that lifts world axis a: gravity gains g t along it
+        c.physics(f"level.{AXES[a]}", "m/s^2", 0.0, rig.gravity * tolerance["level"], layout.GRAVITY + a)
+
+
+def _exciter_parameters(c: _Collector, rig: Rig, places: DeviceLayout) -> None:
+    tolerance = rig.tolerance
+    if rig.exciter is None:
+        return
+    for a in range(3):
+        position, turn = layout.EXCITER_POSITION + a, layout.EXCITER_ROTATION + a
+        c.physics(
+            f"exciter.position.{AXES[a]}", "m", rig.exciter.position[a], tolerance["exciter_position"], position
+        )
+        c.physics(f"exciter.orientation.{AXES[a]}", "rad", 0.0, tolerance["exciter_orientation"], turn)
+    c.physics("exciter.gain", "1", 1.0, tolerance["exciter_gain"], layout.EXCITER_GAIN)
+    c.device("exciter.clock", "s", tolerance["clock"], places.exciter_clock)
+
+
+def _sensor_parameters(c: _Collector, rig: Rig, places: DeviceLayout, channels: set[str]) -> None:
+    tolerance = rig.tolerance
+    for i, cable in enumerate(rig.cables):
+        if cable.name in channels:
+            start = places.load_cells + devices.LOAD_CELL_SIZE * i
+            c.device(f"{cable.name}.load_cell_gain", "1", tolerance["load_cell_gain"], start)
+            c.device(f"{cable.name}.load_cell_zero", "N", tolerance["load_cell_zero"], start + 1)
+    if "imu" in channels:
+        blocks = (
+            ("position", "m", "imu_position"),
+            ("orientation", "rad", "imu_orientation"),
+            ("gyroscope_bias", "rad/s", "gyroscope_bias"),
+            ("gyroscope_scale", "1", "gyroscope_scale"),
+            ("accelerometer_bias", "m/s^2", "accelerometer_bias"),
+            ("accelerometer_scale", "1", "accelerometer_scale"),
+        )
+        for b, (name, unit, key) in enumerate(blocks):
+            for a in range(3):
+                c.device(f"imu.{name}.{AXES[a]}", unit, tolerance[key], places.imu + 3 * b + a)
+    if "inclinometer" in channels:
+        for a in range(3):
+            c.device(
+                f"inclinometer.orientation.{AXES[a]}",
+                "rad",
+                tolerance["inclinometer_orientation"],
+                places.inclinometer + a,
+            )
+    if "mocap" in channels:
+        known = rig.mocap is not None
+        stds = (
+            ("marker_position", "m", tolerance["imu_position"] if known else UNKNOWN_POSITION),
+            ("marker_orientation", "rad", tolerance["imu_orientation"] if known else UNKNOWN_ROTATION),
+            ("tracker_position", "m", UNKNOWN_POSITION),
+            ("tracker_orientation", "rad", UNKNOWN_ROTATION),
+        )
+        for b, (name, unit, std) in enumerate(stds):
+            for a in range(3):
+                c.device(f"mocap.{name}.{AXES[a]}", unit, std, places.mocap + 3 * b + a)
+    keeps_time = next((n for n in (*places.cables, "imu", "mocap", "inclinometer") if n in channels), None)
+    for name in ("imu", "inclinometer", "mocap"):
+        entry = places.clock(name)
+        if name in channels and name != keeps_time and entry is not None:
+            c.device(f"{name}.clock", "s", tolerance["clock"], entry)
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Free parameters of one session: 10 inertial ones, then ``free`` in units of their priors."""
+
+    model: RigModel  # described rig; its inertial block is only a placeholder
+    places: DeviceLayout
+    free: tuple[Parameter, ...]
+
+    @property
+    def size(self) -> int:
+        """Length of the optimiser's vector without start states."""
+        return INERTIAL + len(self.free)
+
+    def start(self, elements: Array) -> Array:
+        """Vector of a body given by its ``elements``, everything else as described."""
+        theta = np.zeros(self.size)
+        theta[:INERTIAL] = log_cholesky_from_linear(linear_from_elements(elements))
+        return theta
+
+    def values(self, theta: Array) -> Array:
+        """Free parameters in their own units."""
+        return np.array([p.nominal + p.prior_std * t for p, t in zip(self.free, theta[INERTIAL:], strict=True)])
+
+    def physics(self, theta: Array) -> Array:
+        """The forward model's flat array."""
+        physics = self.model.physics.copy()
+        physics[layout.INERTIAL : layout.INERTIAL + INERTIAL] = linear_from_log_cholesky(theta[:INERTIAL])
+        for p, value in zip(self.free, self.values(theta), strict=True):
+            if p.kind == "physics":
+                physics[p.index] = value
+        tilt = physics[layout.GRAVITY : layout.GRAVITY + 2]
+        gravity = -self.model.physics[layout.GRAVITY + 2]
+        physics[layout.GRAVITY + 2] = -np.sqrt(gravity**2 - tilt @ tilt)
+        return physics
+
+    def device(self, theta: Array) -> Array:
+        """The devices' flat array (:class:`DeviceLayout`)."""
+        device = np.zeros(self.places.size)
+        for p, value in zip(self.free, self.values(theta), strict=True):
+            if p.kind == "device":
+                device[p.index] = value
+        return device
+
+    def directions(self) -> NDArray[np.int64]:
+        """Entries of ``physics`` that any parameter moves, and the exciter's clock where it is free."""
+        moved = set(range(layout.INERTIAL, layout.INERTIAL + INERTIAL))
+        moved |= {p.index for p in self.free if p.kind == "physics"}
+        if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
+            moved.add(layout.GRAVITY + 2)
+        clock = [EXCITER_CLOCK] if any(p.name == "exciter.clock" for p in self.free) else []
+        return np.array(sorted(moved) + clock, dtype=np.int64)
+
+    def physics_jacobian(self, theta: Array) -> Array:
+        """(len(directions), size): derivative of the chosen physics entries in the vector."""
+        directions = self.directions()
+        row_of = {int(d): r for r, d in enumerate(directions)}
+        out = np.zeros((directions.size, self.size))
+        inertial = complex_step_jacobian(linear_from_log_cholesky, theta[:INERTIAL])
+        for i in range(INERTIAL):
+            out[row_of[layout.INERTIAL + i], :INERTIAL] = inertial[i]
+        physics = self.physics(theta)
+        for column, p in enumerate(self.free, start=INERTIAL):
+            if p.kind == "physics":
+                out[row_of[p.index], column] = p.prior_std
+                if layout.GRAVITY <= p.index < layout.GRAVITY + 2:
+                    slope = -physics[p.index] / physics[layout.GRAVITY + 2]
+                    out[row_of[layout.GRAVITY + 2], column] = p.prior_std * slope
+            elif p.name == "exciter.clock":
+                out[row_of[EXCITER_CLOCK], column] = p.prior_std
+        return out
+
+    def device_columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """(columns of the vector, entries of ``device``, scale) of the device parameters."""
+        rows = [(INERTIAL + i, p.index, p.prior_std) for i, p in enumerate(self.free) if p.kind == "device"]
+        columns = np.array([r[0] for r in rows], dtype=np.int64)
+        entries = np.array([r[1] for r in rows], dtype=np.int64)
+        return columns, entries, np.array([r[2] for r in rows])
+
+    def elements(self, theta: Array) -> Array:
+        """Mass, centre of mass, inertia about it."""
+        return elements_from_linear(linear_from_log_cholesky(theta[:INERTIAL]))
+
+    def elements_jacobian(self, theta: Array) -> Array:
+        """(10, 10) derivative of :meth:`elements` in the first ten entries."""
+        return complex_step_jacobian(
+            lambda t: elements_from_linear(linear_from_log_cholesky(t)), theta[:INERTIAL]
+        )
+
+
+def parameter_set(rig: Rig, model: RigModel, channels: set[str]) -> ParameterSet:
+    """Free parameters of a rig whose recordings hold ``channels`` (cable names, imu, inclinometer, mocap)."""
+    places = DeviceLayout(tuple(cable.name for cable in rig.cables))
+    collector = _Collector()
+    _rig_parameters(collector, rig, model)
+    _exciter_parameters(collector, rig, places)
+    _sensor_parameters(collector, rig, places, channels)
+    return ParameterSet(model, places, tuple(collector.parameters))

@@ -1,0 +1,224 @@
+"""A run's samples against the forward model: residuals, and their exact derivatives in every free parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+from scipy.spatial.transform import Rotation
+
+from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
+from rig_identification.estimate.sampling import interpolation, node_values, rate_of_change
+from rig_identification.estimate.whitening import whiten
+from rig_identification.model import layout, sensors
+from rig_identification.model.constraints import rigid_jacobian
+from rig_identification.model.motion import FIT_STEP, Input, Motion, RigModel, State, simulate, substeps_for
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+#: Unit of a start-state coordinate (m, rad, m/s, rad/s): keeps the vector's entries alike.
+START_UNIT = 0.01
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What every prediction of one session shares."""
+
+    rig: Rig
+    parameters: ParameterSet
+    mocap: sensors.MocapMount | None = None
+
+
+def model_at(parameters: ParameterSet, theta: Array) -> RigModel:
+    """The rig with the numbers of ``theta``."""
+    return parameters.model.with_physics(parameters.physics(theta))
+
+
+def drive(run: Run, parameters: ParameterSet, theta: Array) -> Input:
+    """The measured exciter force at the nodes, its clock corrected."""
+    quiet = Input.none(run.grid.nodes, run.grid.step)
+    if run.exciter is None:
+        return quiet
+    late = parameters.device(theta)[parameters.places.exciter_clock]
+    force = node_values(run.grid, run.exciter.time - late, run.exciter.values)
+    return Input(run.grid.step, force, rate_of_change(run.grid, force), quiet.wrench)
+
+
+def start_basis(model: RigModel, state: State) -> Array:
+    """(12, 2 dof): directions in which a start state can differ, cables kept; in START_UNIT."""
+    n = model.cables
+    G, gap, rate = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
+    count = rigid_jacobian(
+        model.physics, model.modes, state.vector(), np.array(state.R_world_body, order="C"), G, gap, rate
+    )
+    free = null_space(G[:count], rcond=1e-6) if count else np.eye(6)
+    dof = free.shape[1]
+    basis = np.zeros((12, 2 * dof))
+    basis[:6, :dof] = START_UNIT * free
+    basis[6:, dof:] = START_UNIT * free
+    return basis
+
+
+def read_device(bench: Bench, device: str, raw: Array, R: Array, own: Array) -> sensors.Reading:
+    """Reading of one device at the nodes. own: flat array of DeviceLayout."""
+    rig, places = bench.rig, bench.parameters.places
+    if device == "imu" and rig.imu is not None:
+        turn = Rotation.from_quat(rig.imu.orientation).as_matrix()
+        return sensors.imu(raw, rig.imu.position, turn, own[places.imu : places.imu + sensors.IMU_SIZE])
+    if device == "inclinometer" and rig.inclinometer is not None:
+        turn = Rotation.from_quat(rig.inclinometer.orientation).as_matrix()
+        start = places.inclinometer
+        return sensors.inclinometer(raw, turn, own[start : start + sensors.INCLINOMETER_SIZE])
+    if device == "mocap" and bench.mocap is not None:
+        return sensors.mocap(raw, R, bench.mocap, own[places.mocap : places.mocap + sensors.MOCAP_SIZE])
+    cable = places.cables.index(device)
+    start = places.load_cells + sensors.LOAD_CELL_SIZE * cable
+    return sensors.load_cell(raw, cable, own[start : start + sensors.LOAD_CELL_SIZE])
+
+
+def device_start(places: DeviceLayout, device: str) -> int:
+    """First entry of a device's numbers in the flat array."""
+    fixed = {"imu": places.imu, "inclinometer": places.inclinometer, "mocap": places.mocap}
+    if device in fixed:
+        return fixed[device]
+    return places.load_cells + sensors.LOAD_CELL_SIZE * places.cables.index(device)
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """A run about the current parameters: normalised innovations and their derivatives."""
+
+    residual: Array  # (m,) whitened, measured less predicted
+    jacobian: Array  # (m, parameters + start)
+    log_spread: float  # sum of log standard deviations of the innovations
+    motion: Motion
+    nodes: NDArray[np.int64]  # (m,) node of each row
+    channel: NDArray[np.int64]  # (m,) index into run.channels
+    axis: NDArray[np.int64]  # (m,) column within the channel
+
+    @property
+    def cost(self) -> float:
+        """Negative log likelihood less a constant."""
+        return 0.5 * float(self.residual @ self.residual) + self.log_spread
+
+
+def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:
+    """(6, 3): wrench about the datum, body axes, of a force in the exciter frame."""
+    physics = parameters.physics(theta)
+    position = physics[layout.EXCITER_POSITION : layout.EXCITER_POSITION + 3]
+    turn = Rotation.from_rotvec(physics[layout.EXCITER_ROTATION : layout.EXCITER_ROTATION + 3]).as_matrix()
+    force = turn @ parameters.model.exciter_orientation
+    return np.concatenate([force, np.cross(position, force.T).T])
+
+
+def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
+    """(N, 6, 6) covariance of the wrench held over each node interval that the exciter's noise stands for."""
+    out = np.zeros((run.grid.nodes, 6, 6))
+    if run.exciter is None or run.exciter_noise == 0.0:
+        return out
+    spread = exciter_wrench_map(parameters, theta)
+    held = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
+    out[:] = held * spread @ spread.T
+    return out
+
+
+def _channel_rows(
+    bench: Bench, run: Run, channel: Channel, motion: Motion, reading: sensors.Reading, own: Array
+) -> tuple[Array, Array, Array, Array]:
+    """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, 12), D (g, w, 6))."""
+    parameters = bench.parameters
+    late, clock = 0.0, parameters.places.clock(channel.device)
+    if clock is not None:
+        late = own[clock]
+    groups = channel.node.size
+    value, slope = interpolation(run.grid, channel.time - late, channel.group, groups)
+    columns = channel.columns
+    predicted = value @ reading.values[:, columns]
+    residual = channel.grouped - predicted
+    starts = 0 if motion.J is None else motion.J.shape[2]
+    in_raw = reading.in_raw[:, columns]
+    nodes, width = in_raw.shape[:2]
+    total = (in_raw @ motion.J).reshape(nodes, width * starts)
+    jacobian = (value @ total).reshape(groups, width, starts)
+    device_columns, entries, scale = parameters.device_columns()
+    first = device_start(parameters.places, channel.device)
+    size = reading.in_device.shape[2]
+    own_columns = np.zeros((groups, width, parameters.size))
+    own_map = (value @ reading.in_device[:, columns].reshape(nodes, width * size)).reshape(groups, width, size)
+    for column, entry, s in zip(device_columns, entries, scale, strict=True):
+        if first <= entry < first + size:
+            own_columns[:, :, column] = s * own_map[:, :, entry - first]
+        elif clock is not None and entry == clock:
+            own_columns[:, :, column] = -s * (slope @ reading.values[:, columns])
+    H = in_raw[channel.node] @ motion.H[channel.node]  # type: ignore[index]
+    D = in_raw[channel.node] @ motion.D[channel.node]  # type: ignore[index]
+    return residual, np.concatenate([jacobian, own_columns], axis=2), H, D
+
+
+def linearise_run(bench: Bench, run: Run, theta: Array, start: State) -> Linearised | None:
+    """Whitened residual and Jacobian of one run; None where the motion leaves every bound.
+
+    Jacobian columns: the vector of ``bench.parameters``, then the start coordinates of
+    :func:`start_basis`.
+    """
+    parameters = bench.parameters
+    model = model_at(parameters, theta)
+    basis = start_basis(model, start)
+    directions = parameters.directions()
+    motion = simulate(
+        model,
+        start,
+        drive(run, parameters, theta),
+        directions=directions,
+        start_basis=basis,
+        substeps=substeps_for(model, run.grid.step, FIT_STEP),
+    )
+    if not motion.complete:
+        return None
+    own = parameters.device(theta)
+    in_physics = parameters.physics_jacobian(theta)
+    starts = basis.shape[1]
+    width = parameters.size + starts
+    stacked: list[tuple[Array, ...]] = []
+    readings: dict[str, sensors.Reading] = {}
+    for index, channel in enumerate(run.channels):
+        if channel.device not in readings:
+            readings[channel.device] = read_device(
+                bench, channel.device, motion.outputs, motion.R_world_body, own
+            )
+        residual, jacobian, H, D = _channel_rows(bench, run, channel, motion, readings[channel.device], own)
+        motion_width = starts + directions.size
+        full = np.zeros((*residual.shape, width))
+        full[:, :, parameters.size :] = jacobian[:, :, :starts]
+        full[:, :, : parameters.size] = (
+            jacobian[:, :, starts:motion_width] @ in_physics + jacobian[:, :, motion_width:]
+        )
+        rows, axes = residual.size, channel.width
+        stacked.append(
+            (
+                np.repeat(channel.node, axes),
+                np.full(rows, index, dtype=np.int64),
+                np.tile(np.arange(axes), channel.node.size),
+                H.reshape(rows, 12),
+                D.reshape(rows, 6),
+                channel.grouped_variance.ravel(),
+                np.concatenate([residual.reshape(rows, 1), full.reshape(rows, width)], axis=1),
+            )
+        )
+    node, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
+    order = np.argsort(node, kind="stable")
+    node, which, axis, H, D, variance, columns = (
+        np.ascontiguousarray(part[order]) for part in (node, which, axis, H, D, variance, columns)
+    )
+    Q = force_noise(run, parameters, theta)
+    if np.any(Q):
+        log_spread = float(whiten(motion.A, motion.B, Q, node, H, D, variance, columns))
+    else:
+        deviation = np.sqrt(variance)
+        columns /= deviation[:, None]
+        log_spread = float(np.sum(np.log(deviation)))
+    return Linearised(columns[:, 0], columns[:, 1:], log_spread, motion, node, which, axis)

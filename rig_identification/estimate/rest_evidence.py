@@ -1,0 +1,136 @@
+"""A static recording as the estimator sees it: one mean a channel, with its honest uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import _noise
+from rig_identification.estimate.prediction import Bench, device_start, read_device
+from rig_identification.model import layout
+from rig_identification.model.body import point_inertia, six_elements
+from rig_identification.model.equilibrium import Rest, find_rest
+from rig_identification.model.motion import RigModel, State
+from rig_identification.recording import Dummy, Recording
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RestChannel:
+    """Mean reading of one device quantity at rest."""
+
+    device: str
+    quantity: str
+    unit: str
+    columns: slice
+    mean: Array  # (w,)
+    variance: Array  # (w,) of the mean
+    noise: Array  # (w,) of one sample
+
+
+@dataclass(frozen=True)
+class RestEvidence:
+    """One static recording."""
+
+    recording: Recording
+    dummy: Dummy | None
+    channels: tuple[RestChannel, ...]
+
+
+def mean_variance(values: Array, noise: Array) -> Array:
+    """(w,) variance of the mean of samples (n, w): white noise, or more where block means scatter more.
+
+    Residual swing and drift are not white; the scatter of eight block means shows what they
+    leave in the mean (batch means, Law, "Simulation Modeling and Analysis", section 9.5).
+    """
+    white = noise**2 / values.shape[0]
+    blocks = np.array_split(values, 8)
+    if min(block.shape[0] for block in blocks) < 4:
+        return np.asarray(white)
+    means = np.array([np.mean(block, axis=0) for block in blocks])
+    return np.asarray(np.maximum(white, np.var(means, axis=0, ddof=1) / 8.0))
+
+
+def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
+    """Means of everything that a static recording holds."""
+    channels: list[RestChannel] = []
+
+    def add(device: str, quantity: str, unit: str, noise: str, values: Array, columns: slice) -> None:
+        std, _ = _noise(rig, noise, values)
+        mean = np.mean(values, axis=0)
+        channels.append(RestChannel(device, quantity, unit, columns, mean, mean_variance(values, std), std))
+
+    for cable, series in recording.tension.items():
+        add(cable, "tension", "N", "tension", series.values, slice(0, 1))
+    if recording.imu is not None and rig.imu is not None:
+        values = recording.imu.values
+        add("imu", "angular_rate", "rad/s", "angular_rate", values[:, :3], slice(0, 3))
+        add("imu", "specific_force", "m/s^2", "specific_force", values[:, 3:], slice(3, 6))
+    if recording.inclination is not None and rig.inclinometer is not None:
+        add("inclinometer", "inclination", "rad", "inclination", recording.inclination.values, slice(0, 2))
+    return RestEvidence(recording, recording.dummy, tuple(channels))
+
+
+def with_dummy(model: RigModel, dummy: Dummy | None) -> RigModel:
+    """The body with a known mass fixed to it: inertial parameters about the datum add."""
+    if dummy is None:
+        return model
+    physics = model.physics.copy()
+    extra = np.concatenate(
+        [[dummy.mass], dummy.mass * dummy.position, six_elements(point_inertia(dummy.mass, dummy.position))]
+    )
+    physics[layout.INERTIAL : layout.INERTIAL + 10] += extra
+    return model.with_physics(physics)
+
+
+@dataclass(frozen=True)
+class RestLinearised:
+    """Whitened means less predicted at rest, and their derivatives."""
+
+    residual: Array  # (m,)
+    jacobian: Array  # (m, parameters)
+    log_spread: float
+    rest: Rest
+    predicted: tuple[Array, ...]  # one (w,) a channel
+
+    @property
+    def cost(self) -> float:
+        """Negative log likelihood less a constant."""
+        return 0.5 * float(self.residual @ self.residual) + self.log_spread
+
+
+def linearise_rest(bench: Bench, evidence: RestEvidence, theta: Array, guess: State) -> RestLinearised | None:
+    """Residual and Jacobian of one static recording; None where no rest pose is found near ``guess``."""
+    parameters = bench.parameters
+    model = with_dummy(parameters.model.with_physics(parameters.physics(theta)), evidence.dummy)
+    rest = find_rest(model, guess, directions=parameters.directions())
+    if not rest.converged:
+        return None
+    own = parameters.device(theta)
+    in_physics = parameters.physics_jacobian(theta)
+    device_columns, entries, scale = parameters.device_columns()
+    R = rest.state.R_world_body[None]
+    residuals, jacobians, predictions = [], [], []
+    log_spread = 0.0
+    for channel in evidence.channels:
+        reading = read_device(bench, channel.device, rest.outputs, R, own)
+        predicted = reading.values[0, channel.columns]
+        jacobian = reading.in_raw[0, channel.columns] @ rest.J[0] @ in_physics
+        first = device_start(parameters.places, channel.device)
+        for column, entry, s in zip(device_columns, entries, scale, strict=True):
+            if first <= entry < first + reading.in_device.shape[2]:
+                jacobian[:, column] += s * reading.in_device[0, channel.columns, entry - first]
+        deviation = np.sqrt(channel.variance)
+        residuals.append((channel.mean - predicted) / deviation)
+        jacobians.append(jacobian / deviation[:, None])
+        predictions.append(predicted)
+        log_spread += float(np.sum(np.log(deviation)))
+    if not residuals:
+        return None
+    return RestLinearised(
+        np.concatenate(residuals), np.concatenate(jacobians), log_spread, rest, tuple(predictions)
+    )

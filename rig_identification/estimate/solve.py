@@ -1,0 +1,192 @@
+"""Maximum a posteriori estimate: Gauss-Newton on everything at once, damped where a step does not pay.
+
+Cost = 1/2 |whitened residuals|^2 + log spreads + 1/2 |(theta - prior)/std|^2. The residuals of
+each run come whitened (whitening.py), so J^T J is the Fisher information and its inverse the
+Laplace covariance (MacKay, "Information Theory, Inference, and Learning Algorithms", ch. 27).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.prediction import Bench, Linearised, linearise_run, model_at, start_basis
+from rig_identification.estimate.rest_evidence import (
+    RestEvidence,
+    RestLinearised,
+    linearise_rest,
+    with_dummy,
+)
+from rig_identification.model.equilibrium import settle
+from rig_identification.model.motion import State, on_cables
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is fitted to what."""
+
+    bench: Bench
+    runs: tuple[Run, ...]
+    rests: tuple[RestEvidence, ...]
+    mass: tuple[float, float] | None  # ground scale: value and std, kg
+    weak: Array  # (10,) std of a weak prior on the log-Cholesky vector about ``weak_center``
+    weak_center: Array  # (10,)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A value of every unknown."""
+
+    theta: Array
+    starts: tuple[State, ...]  # one a run
+    rest_guesses: tuple[State, ...]  # one a static recording
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The problem linearised at a point."""
+
+    point: Point
+    runs: tuple[Linearised, ...]
+    rests: tuple[RestLinearised, ...]
+    cost: float
+    information: Array  # (p + starts, p + starts), data and priors
+    prior_information: Array  # (p,) diagonal that priors alone contribute
+    gradient: Array  # (p + starts,) of the negative cost
+
+
+def _prior(problem: Problem, theta: Array) -> tuple[float, Array, Array]:
+    """(cost, information (p, p), negative gradient (p,)) of tolerances, weak prior and ground scale."""
+    p = problem.bench.parameters.size
+    deviation = theta.copy()
+    deviation[:INERTIAL] = (theta[:INERTIAL] - problem.weak_center) / problem.weak
+    weight = np.ones(p)
+    weight[:INERTIAL] = 1.0 / problem.weak**2
+    information = np.diag(weight)
+    gradient = -theta.copy()
+    gradient[:INERTIAL] = -deviation[:INERTIAL] / problem.weak
+    cost = 0.5 * float(deviation @ deviation)
+    if problem.mass is not None:
+        value, std = problem.mass
+        elements = problem.bench.parameters.elements(theta)
+        row = problem.bench.parameters.elements_jacobian(theta)[0] / std
+        miss = (value - elements[0]) / std
+        cost += 0.5 * miss**2
+        information[:INERTIAL, :INERTIAL] += np.outer(row, row)
+        gradient[:INERTIAL] += row * miss
+    return cost, information, gradient
+
+
+def evaluate(problem: Problem, point: Point) -> Evaluation | None:
+    """Linearise everything at ``point``; None where a run or a rest pose cannot be computed."""
+    bench = problem.bench
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        runs = list(
+            pool.map(lambda item: linearise_run(bench, item[0], point.theta, item[1]), zip(problem.runs, point.starts, strict=True))
+        )
+    if any(r is None for r in runs):
+        return None
+    rests = []
+    for evidence, guess in zip(problem.rests, point.rest_guesses, strict=True):
+        rest = linearise_rest(bench, evidence, point.theta, guess)
+        if rest is None:
+            model = with_dummy(model_at(bench.parameters, point.theta), evidence.dummy)
+            rest = linearise_rest(bench, evidence, point.theta, settle(model, guess))
+        if rest is None:
+            return None
+        rests.append(rest)
+    return _assemble(problem, point, tuple(r for r in runs if r is not None), tuple(rests))
+
+
+def _assemble(
+    problem: Problem, point: Point, runs: tuple[Linearised, ...], rests: tuple[RestLinearised, ...]
+) -> Evaluation:
+    p = problem.bench.parameters.size
+    cost, prior, prior_gradient = _prior(problem, point.theta)
+    total = p + sum(r.jacobian.shape[1] - p for r in runs)
+    information, gradient = np.zeros((total, total)), np.zeros(total)
+    information[:p, :p] = prior
+    gradient[:p] = prior_gradient
+    place = p
+    for run in runs:
+        starts = run.jacobian.shape[1] - p
+        columns = np.concatenate([np.arange(p), np.arange(place, place + starts)])
+        information[np.ix_(columns, columns)] += run.jacobian.T @ run.jacobian
+        gradient[columns] += run.jacobian.T @ run.residual
+        cost += run.cost
+        place += starts
+    for rest in rests:
+        information[:p, :p] += rest.jacobian.T @ rest.jacobian
+        gradient[:p] += rest.jacobian.T @ rest.residual
+        cost += rest.cost
+    return Evaluation(point, runs, rests, cost, information, np.diag(prior).copy(), gradient)
+
+
+def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
+    p = problem.bench.parameters.size
+    theta = evaluation.point.theta + change[:p]
+    old = model_at(problem.bench.parameters, evaluation.point.theta)
+    new = model_at(problem.bench.parameters, theta)
+    starts, place = [], p
+    for state in evaluation.point.starts:
+        basis = start_basis(old, state)
+        own = change[place : place + basis.shape[1]]
+        starts.append(on_cables(new, state.moved(basis @ own)))
+        place += basis.shape[1]
+    guesses = tuple(rest.rest.state for rest in evaluation.rests)
+    return Point(theta, tuple(starts), guesses)
+
+
+#: A step is believed while no entry of the log-Cholesky vector and no prior unit moves further.
+LONGEST_STEP = 1.0
+
+
+def solve(
+    problem: Problem,
+    point: Point,
+    *,
+    iterations: int = 30,
+    tolerance: float = 1e-3,
+    notify: Callable[[int, float], None] | None = None,
+) -> tuple[Evaluation, bool]:
+    """Minimise from ``point``: (last evaluation, whether it converged).
+
+    Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
+    estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum.
+    """
+    current = evaluate(problem, point)
+    if current is None:
+        raise FloatingPointError("the forward model cannot be evaluated at the first guess")
+    damping = 1e-6
+    for iteration in range(iterations):
+        diagonal = np.diag(current.information)
+        while True:
+            damped = current.information + damping * np.diag(diagonal)
+            change = np.linalg.solve(damped, current.gradient)
+            gain = 0.5 * float(change @ current.gradient)
+            if gain < tolerance and damping <= 1e-3:
+                return current, True
+            trial = evaluate(problem, _moved(problem, current, change))
+            if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
+                damping = max(damping * 0.1, 1e-9)
+                current = trial
+                break
+            damping = max(damping, 1e-6) * 10.0
+            if damping > 1e6:
+                return current, False
+        if notify is not None:
+            notify(iteration, current.cost)
+    return current, False
+
+
+def shortened(problem: Problem, end: float) -> Problem:
+    """The same problem on the first ``end`` seconds of every run."""
+    return replace(problem, runs=tuple(run.until(end) for run in problem.runs))

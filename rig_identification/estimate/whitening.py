@@ -1,0 +1,89 @@
+"""Prediction errors of a motion that noise drives as force: one Kalman pass, any number of columns.
+
+About the nominal motion, x_{k+1} = A_k x_k + B_k w_k with w_k ~ N(0, Q_k) white, and a grouped
+sample at node k reads H x_k + D w_k + e. The filter's innovations, divided by their own
+standard deviation, are white under the model (Kailath, IEEE TAC 13, 1968); what it does
+to the residual it does to every column of the Jacobian, and least squares on the result
+is generalised least squares with the exact covariance of force and sensor noise. The sum
+of log standard deviations is what the marginal likelihood needs beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def whiten(A, B, Q, node, H, D, variance, columns):  # type: ignore[no-untyped-def]
+    """Replace ``columns`` (m, c) by their normalised innovations; returns the sum of log standard deviations.
+
+    node (m,): ascending node index of each row. H (m, 12), D (m, 6): response of the row to
+    state and wrench. variance (m,): sensor noise of the row. Q (N, 6, 6): covariance of the
+    wrench over each interval. Column 0 is measured less predicted, the others derivatives
+    of the prediction.
+    """
+    rows, count = columns.shape
+    size = 18
+    P = np.zeros((size, size))
+    X = np.zeros((size, count))
+    gain = np.empty(size)
+    h = np.empty(size)
+    log_sum = 0.0
+    row = 0
+    x_next = np.empty((12, count))
+    P_next = np.empty((12, 12))
+    F = np.empty((12, size))
+    for k in range(A.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                P[12 + i, 12 + j] = Q[k, i, j]
+            for j in range(12):
+                P[12 + i, j] = 0.0
+                P[j, 12 + i] = 0.0
+            for c in range(count):
+                X[12 + i, c] = 0.0
+        while row < rows and node[row] == k:
+            for i in range(12):
+                h[i] = H[row, i]
+            for i in range(6):
+                h[12 + i] = D[row, i]
+            spread = variance[row]
+            for i in range(size):
+                total = 0.0
+                for j in range(size):
+                    total += P[i, j] * h[j]
+                gain[i] = total
+            for i in range(size):
+                spread += h[i] * gain[i]
+            deviation = np.sqrt(spread)
+            log_sum += np.log(deviation)
+            for c in range(count):
+                total = columns[row, c]
+                for i in range(size):
+                    total -= h[i] * X[i, c]
+                columns[row, c] = total / deviation
+            for i in range(size):
+                g = gain[i] / deviation
+                for c in range(count):
+                    X[i, c] += g * columns[row, c]
+            for i in range(size):
+                g = gain[i] / spread
+                for j in range(size):
+                    P[i, j] -= g * gain[j]
+            row += 1
+        F[:, :12] = A[k]
+        F[:, 12:] = B[k]
+        for i in range(12):
+            for c in range(count):
+                total = 0.0
+                for j in range(size):
+                    total += F[i, j] * X[j, c]
+                x_next[i, c] = total
+        P_next[:, :] = np.dot(np.dot(F, P), F.T)
+        for i in range(12):
+            for c in range(count):
+                X[i, c] = x_next[i, c]
+            for j in range(12):
+                P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
+    return log_sum
