@@ -11,7 +11,6 @@ from pathlib import Path
 
 from rig_identification.cli.output import check_output_folder, write_together
 from rig_identification.cli.progress import StageProgress
-from rig_identification.cli.summary import summary
 from rig_identification.recording import Session
 from rig_identification.result import Identification
 
@@ -56,8 +55,7 @@ def identify_session(
         identification = _identify(session, progress)
         progress("writing the report")
         _write(identification, session, out)
-    print(summary(identification))
-    print(f"report: {out / REPORT}")
+    _print(identification, out)
 
 
 def _read(path: Path, namespace: str, topics: dict[str, str], progress: StageProgress) -> Session:
@@ -84,6 +82,13 @@ def _write(identification: Identification, session: Session, out: Path) -> None:
             REPORT: lambda path: write_report(identification, session, path),
         },
     )
+
+
+def _print(identification: Identification, out: Path) -> None:
+    from rig_identification.cli.summary import summary
+
+    print(summary(identification))
+    print(f"report: {out / REPORT}")
 
 
 def _mapping(text: str) -> tuple[str, str]:

@@ -1,0 +1,242 @@
+"""The command line: exit status, one line for what is wrong, both files or neither."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rig_identification import __version__
+from rig_identification.cli.main import main
+from rig_identification.cli.output import write_together
+from rig_identification.cli.progress import QUIET_SECONDS, StageProgress
+from rig_identification.cli.summary import summary
+from rig_identification.errors import InputError
+from rig_identification.recording import Session
+from rig_identification.result import Identification
+
+Install = Callable[[object], None]
+
+
+@pytest.fixture
+def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Identification) -> Install:
+    """Stand in for reading and estimating: the command line is tested here, not the estimate."""
+    seen: dict[str, object] = {}
+
+    def install(outcome: object) -> None:
+        def identify(given: Session, *, progress: object = None) -> Identification:
+            assert given is session
+            if isinstance(outcome, BaseException):
+                raise outcome
+            return identification
+
+        def read_session(path: Path, **options: object) -> Session:
+            seen.update(options, path=path)
+            return session
+
+        module = types.ModuleType("rig_identification.estimate")
+        module.identify = identify  # type: ignore[attr-defined]
+        monkeypatch.setitem(sys.modules, "rig_identification.estimate", module)
+        monkeypatch.setattr("rig_identification.session.read_session", read_session)
+
+    install.seen = seen  # type: ignore[attr-defined]
+    return install
+
+
+def test_writes_result_and_report_and_prints_the_numbers(
+    answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(None)
+    out = tmp_path / "new" / "out"
+    assert main(["identify", "van", "--out", str(out)]) == 0
+    assert sorted(p.name for p in out.iterdir()) == ["report.html", "result.json"]
+    assert json.loads((out / "result.json").read_text())["mass"]["value"] == 1240.13
+    printed = capsys.readouterr()
+    assert "1240.13 ± 0.78 kg" in " ".join(printed.out.split())
+    assert printed.out.rstrip().endswith(str(out / "report.html"))
+    assert printed.err == ""
+
+
+def test_keeps_other_files_and_replaces_its_own(answer: Install, tmp_path: Path) -> None:
+    answer(None)
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "result.json").write_text("old")
+    assert main(["identify", "van", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert json.loads((tmp_path / "result.json").read_text())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["notes.txt", "report.html", "result.json"]
+
+
+def test_topics_and_namespace_reach_the_reader(answer: Install, tmp_path: Path) -> None:
+    answer(None)
+    arguments = [
+        "--namespace",
+        "/lab",
+        "--topic",
+        "imu/data_raw=/xsens/imu",
+        "--topic",
+        "mocap/pose=/vicon/van",
+    ]
+    assert main(["identify", "van", "--out", str(tmp_path), *arguments]) == 0
+    seen = answer.seen  # type: ignore[attr-defined]
+    assert seen["namespace"] == "/lab"
+    assert seen["topics"] == {"imu/data_raw": "/xsens/imu", "mocap/pose": "/vicon/van"}
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status", "word"),
+    [
+        (InputError("run_1: something\nis wrong"), 2, "error: run_1: something is wrong"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (ZeroDivisionError("division by zero"), 1, "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_failed_run_says_one_line_and_writes_nothing(
+    answer: Install,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    outcome: object,
+    status: int,
+    word: str,
+) -> None:
+    answer(outcome)
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    (kept / "result.json").write_text("old")
+    for out in (kept, tmp_path / "new"):
+        assert main(["identify", "van", "--out", str(out)]) == status
+        printed = capsys.readouterr()
+        assert printed.out == ""
+        assert printed.err.startswith("rig-identification: ")
+        assert printed.err.count("\n") == 1
+        assert word in printed.err
+    assert [p.name for p in tmp_path.iterdir()] == ["kept"]
+    assert [(p.name, p.read_text()) for p in kept.iterdir()] == [("result.json", "old")]
+
+
+def test_debug_shows_the_defect(answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer(ZeroDivisionError("division by zero"))
+    assert main(["identify", "van", "--out", str(tmp_path), "--debug"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_report_that_fails_leaves_no_result(
+    answer: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(None)
+
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("rig_identification.report.write_report", full_disk)
+    for out in (tmp_path, tmp_path / "new"):
+        assert main(["identify", "van", "--out", str(out)]) == 2
+        assert "No space left on device" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_out_that_cannot_be_used(answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer(AssertionError("the work must not begin"))
+    file = tmp_path / "file"
+    file.write_text("")
+    occupied = tmp_path / "occupied"
+    (occupied / "report.html").mkdir(parents=True)
+    for out in (file, file / "below", occupied):
+        assert main(["identify", "van", "--out", str(out)]) == 2
+        error = capsys.readouterr().err
+        assert str(out) in error
+        assert error.count("\n") == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+def test_out_that_is_not_writable(
+    answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(AssertionError("the work must not begin"))
+    tmp_path.chmod(0o500)
+    assert main(["identify", "van", "--out", str(tmp_path / "out")]) == 2
+    assert "not writable" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["identify"], ["identify", "van"], ["identify", "van", "--out", "x", "--topic", "imu"], ["identfy"]],
+)
+def test_wrong_arguments_are_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_process_itself(tmp_path: Path) -> None:
+    """The true reader and a true process, on a session that is not there."""
+    command = [sys.executable, "-m", "rig_identification.cli.main"]
+    version = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
+    assert version.stdout == f"rig-identification {__version__}\n"
+    missing = [*command, "identify", str(tmp_path / "nothing"), "--out", str(tmp_path / "out")]
+    done = subprocess.run(missing, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert str(tmp_path / "nothing") in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_output_for_a_terminal_of_ascii_alone(tmp_path: Path) -> None:
+    """``±`` and ``²`` must not end a run whose numbers are written."""
+    code = "from rig_identification.cli.main import main; import sys; main(['--version'])"
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    body = "from rig_identification.cli.main import _accept_any_terminal as a; a(); print('± kg m²')"
+    for line in (code, body):
+        done = subprocess.run([sys.executable, "-c", line], capture_output=True, env=environment, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_moving_aside_is_undone_when_a_writer_fails(tmp_path: Path) -> None:
+    def interrupted(path: Path) -> None:
+        path.write_text("half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_together(tmp_path / "out", {"a": lambda path: path.write_text("a") and None, "b": interrupted})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_where_nobody_watches_is_a_line_a_stage() -> None:
+    now = [0.0]
+    stream = io.StringIO()
+    with StageProgress(stream, clock=lambda: now[0]) as progress:
+        progress("reading run_1")
+        now[0] = QUIET_SECONDS + 1.0
+        for fraction in (0.1, 0.5, 0.9):
+            progress("fitting", fraction)
+        progress("covariance")
+    assert stream.getvalue() == "fitting\ncovariance\n"
+
+
+def test_progress_on_a_terminal_moves() -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    stream = Terminal()
+    with StageProgress(stream) as progress:
+        progress("reading [run_1]")
+        progress("fitting", 0.5)
+    assert "fitting" in stream.getvalue()
+
+
+def test_summary_names_what_is_not_determinable(explained: Identification) -> None:
+    text = summary(explained)
+    lines = {line.split()[0]: line for line in text.splitlines() if line.startswith("  ")}
+    assert list(lines) == ["m", "cx", "cy", "cz", "Jxx", "Jxy", "Jxz", "Jyy", "Jyz", "Jzz"]
+    assert "not determinable" in lines["Jzz"]
+    assert "-14.21" in lines["Jxy"]
+    assert "explained" in text
