@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
 from rig_identification.errors import InputError
-from rig_identification.session.bag import Bytes, MessageBlock, RawTopic
+from rig_identification.session.raw_topic import Bytes, MessageBlock, RawTopic
 
 Floats = NDArray[np.float64]
 _ENCAPSULATION = 4

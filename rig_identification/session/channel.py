@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
 from rig_identification.recording import ChannelQuality, Series
-from rig_identification.session.bag import RawTopic
 from rig_identification.session.cdr import decode
 from rig_identification.session.clipping import clipped_samples
+from rig_identification.session.raw_topic import RawTopic
 from rig_identification.session.stamps import StampSelection, select_stamps
 from rig_identification.session.topics import Topic
 
