@@ -1,7 +1,7 @@
 """How fast a bag is read, beside rosbags' own deserialization of the same bag.
 
-Makes a bag of 7 topics at 1 kHz in a temporary folder, reads it both ways in processes of their own, and prints
-seconds, messages per second, peak memory and the ratio:
+Makes a bag of 7 topics at 1 kHz in a temporary folder, reads it both ways in processes of their own, and
+prints seconds, messages per second, peak memory and the ratio:
 
     python bench/read_bag.py [--seconds 250] [--storage mcap sqlite3] [--compression none]
 """

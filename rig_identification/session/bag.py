@@ -1,7 +1,7 @@
 """Serialized messages of a rosbag2 folder, taken in bulk.
 
-rosbags reads the metadata and decompresses files. Its message iterator makes several Python objects a message,
-so the storages' messages are taken by :mod:`.mcap_storage` and :mod:`.sqlite3_storage`.
+rosbags reads the metadata and decompresses files. Its message iterator makes several Python objects a
+message, so the storages' messages are taken by :mod:`.mcap_storage` and :mod:`.sqlite3_storage`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2.reader import DirectoryReader
@@ -31,7 +31,7 @@ else:
 class _Folder(DirectoryReader):
     """rosbags' reader of bag folders; its own sqlite3 storage counts every message before it opens."""
 
-    STORAGE_PLUGINS: ClassVar[dict[str, Any]] = {"mcap": McapReader, "sqlite3": Sqlite3Topics}
+    STORAGE_PLUGINS: dict[str, Any] = {"mcap": McapReader, "sqlite3": Sqlite3Topics}  # noqa: RUF012
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,18 @@ class RawTopic:
         return len(self.received_ns)
 
 
+def distinct(numbers: Integers) -> list[int]:
+    """Distinct ``numbers``; mostly there is one."""
+    if len(numbers) and numbers.min() == numbers.max():
+        return [int(numbers[0])]
+    return [int(number) for number in np.unique(numbers)]
+
+
+def slices(buffer: Bytes, starts: Integers, length: int) -> Bytes:
+    """(n, length) copies of ``buffer[start : start + length]``."""
+    return np.lib.stride_tricks.sliding_window_view(buffer, length)[starts]
+
+
 class Collector:
     """Gathers messages by topic and length, in the order of the file.
 
@@ -56,7 +68,7 @@ class Collector:
         if self._unpack:
             messages = list(map(self._unpack, messages))
         lengths = np.fromiter(map(len, messages), np.int64, len(messages))
-        for length in np.unique(lengths):
+        for length in distinct(lengths):
             chosen = np.flatnonzero(lengths == length)
             joined = b"".join([messages[i] for i in chosen.tolist()])
             self._append(topic, chosen, np.frombuffer(joined, np.uint8).reshape(len(chosen), length))
@@ -73,10 +85,9 @@ class Collector:
             self.add(topic, received_ns, [raw[start:end] for start, end in bounds])
             return
         lengths = behind - first
-        for length in np.unique(lengths):
+        for length in distinct(lengths):
             chosen = np.flatnonzero(lengths == length)
-            windows = np.lib.stride_tricks.sliding_window_view(buffer, int(length))
-            self._append(topic, chosen, windows[first[chosen]])
+            self._append(topic, chosen, slices(buffer, first[chosen], length))
         self._advance(topic, received_ns)
 
     def take(self, name: str, message_type: str) -> RawTopic:

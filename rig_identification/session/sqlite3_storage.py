@@ -1,8 +1,8 @@
 """Messages of a sqlite3 bag, taken from the file's pages in bulk.
 
 A query costs a Python object for each column of each message, more than all further work on it together.
-The file format is simple and frozen, so the leaves of the table ``messages`` are read as arrays. Whatever does
-not look as expected is left to a query.
+The file format is simple and frozen, so the leaves of the table ``messages`` are read as arrays. Whatever
+does not look as expected is left to a query.
 
 Layout: https://www.sqlite.org/fileformat2.html, sections 1.3, 1.6 and 2.1.
 """
@@ -19,9 +19,9 @@ import numpy as np
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinition, MessageDefinitionFormat
 from rosbags.rosbag2.metadata import ReaderMetadata
 
-from rig_identification.session.raw_topic import Bytes, Collector, Integers
+from rig_identification.session.raw_topic import Bytes, Collector, Integers, distinct, slices
 
-_PAGES_AT_ONCE = 2048
+_PAGES_AT_ONCE = 512
 _ROWS_AT_ONCE = 20_000
 _INTERIOR, _LEAF = 0x05, 0x0D
 _COLUMNS = ("id", "topic_id", "timestamp", "data")
@@ -191,6 +191,17 @@ def _big_endian(pairs: Bytes) -> Integers:
     return pairs[..., 0].astype(np.int64) << 8 | pairs[..., 1]
 
 
+def _signed(digits: Bytes) -> Integers:
+    """Integers of the big-endian two's complement ``digits`` (n, size)."""
+    size = digits.shape[1]
+    if size in (1, 2, 4, 8):
+        return digits.view(f">i{size}")[:, 0].astype(np.int64)
+    value = digits[:, 0].astype(np.int8).astype(np.int64)
+    for place in range(1, size):
+        value = value << 8 | digits[:, place]
+    return value
+
+
 def _varint(buffer: Bytes, at: Integers) -> tuple[Integers, Integers]:
     """Integers of variable length at ``at``, and the places behind them."""
     first = buffer[at]
@@ -208,7 +219,7 @@ def _varint(buffer: Bytes, at: Integers) -> tuple[Integers, Integers]:
 def _integer(buffer: Bytes, at: Integers, kinds: Integers) -> tuple[Integers, Integers]:
     """Integers of serial types ``kinds`` at ``at``, and the places behind them."""
     value, behind = np.empty(len(at), np.int64), at.copy()
-    for kind in np.unique(kinds).tolist():
+    for kind in distinct(kinds):
         if kind not in _INTEGER_BYTES:
             raise UnknownLayout("a number of another type")
         size = _INTEGER_BYTES[kind]
@@ -216,9 +227,6 @@ def _integer(buffer: Bytes, at: Integers, kinds: Integers) -> tuple[Integers, In
         if size == 0:
             value[chosen] = kind - 8
             continue
-        number = buffer[at[chosen]].astype(np.int8).astype(np.int64)
-        for place in range(1, size):
-            number = number << 8 | buffer[at[chosen] + place]
-        value[chosen] = number
+        value[chosen] = _signed(slices(buffer, at[chosen], size))
         behind[chosen] += size
     return value, behind

@@ -51,7 +51,8 @@ def select_stamps(stamp_ns: Stamps, received_ns: Stamps) -> StampSelection:
     if far := int(np.count_nonzero(~near)):
         notes.append(f"{far} stamps lie far from the others: left out")
     stamps, received = stamp_ns[chosen], received_ns[chosen]
-    unique = np.sort(np.unique(stamps, return_index=True)[1])
+    rising = bool(np.all(np.diff(stamps) > 0))
+    unique = np.arange(len(stamps)) if rising else np.sort(np.unique(stamps, return_index=True)[1])
     duplicated = len(chosen) - len(unique)
     chosen, stamps, received = chosen[unique], stamps[unique], received[unique]
     pieces = _pieces(stamps, received)
@@ -76,7 +77,7 @@ def _near(stamps: Stamps, received: Stamps) -> NDArray[np.bool_]:
     """Stamps within reach of the median one: twice the recording's length and a minute."""
     if not len(stamps):
         return np.zeros(0, bool)
-    span = max(len(stamps) * _median_interval(np.sort(stamps)), float(np.ptp(received)))
+    span = max(len(stamps) * _median_interval(np.sort(stamps, kind="stable")), float(np.ptp(received)))
     middle = np.partition(stamps, len(stamps) // 2)[len(stamps) // 2]
     return np.asarray(np.abs(stamps - middle) <= 2.0 * span + 60.0 * _SECOND)
 
