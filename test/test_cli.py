@@ -199,6 +199,26 @@ def test_output_for_a_terminal_of_ascii_alone(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs a pipe that closes")
+def test_a_reader_that_leaves_early_is_no_defect() -> None:
+    code = (
+        "import sys; from rig_identification.cli import main as m\n"
+        "from rig_identification.cli.commands import identify\n"
+        "def run(arguments):\n    for _ in range(20000):\n        print('line', flush=True)\n"
+        "identify.run = run\n"
+        "sys.exit(m.main(['identify', 'x', '--out', 'y']))"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
 def test_moving_aside_is_undone_when_a_writer_fails(tmp_path: Path) -> None:
     def interrupted(path: Path) -> None:
         path.write_text("half")

@@ -412,6 +412,20 @@ def test_nothing_determined_and_nothing_compared(identification: Identification,
     assert not re.search(r"\bnan\b", told.text, re.IGNORECASE)
 
 
+def test_a_prediction_that_ran_away_is_told(identification: Identification, session: Session) -> None:
+    fit, lost = identification.channels[0], identification.channels[1]
+    predicted = fit.predicted.copy()
+    predicted[-7:] = np.nan
+    channels = (
+        replace(fit, predicted=predicted),
+        replace(lost, predicted=np.full_like(lost.predicted, np.inf)),
+    )
+    told = Page(render_report(replace(identification, channels=channels, training_error=np.nan), session))
+    assert "static_bare, cable_1 tension: 7 samples have no finite prediction." in told.text
+    assert "static_bare, cable_2 tension: 4000 samples" in told.text
+    assert not re.search(r"\bnan\b", told.text, re.IGNORECASE)
+
+
 def test_names_from_outside_cannot_become_markup(identification: Identification, session: Session) -> None:
     bad = "<script>alert(1)</script>&\"'"
     fit = replace(identification.channels[0], channel=bad, unit=bad)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 
 import numpy as np
@@ -40,6 +40,26 @@ class RecordingView:
     rms: float
     channels: tuple[ChannelView, ...]
     open: bool
+
+
+def finite_channels(channels: tuple[ChannelFit, ...]) -> tuple[tuple[ChannelFit, ...], tuple[str, ...]]:
+    """Drop samples without a finite prediction, and channels that are left with none; a sentence for each.
+
+    A fit that did not converge may predict nonsense; the page still has to show the rest.
+    """
+    kept, notes = [], []
+    for fit in channels:
+        finite = np.isfinite(fit.residual_in_sigma)
+        lost = len(finite) - int(np.count_nonzero(finite))
+        if lost:
+            notes.append(f"{fit.recording}, {channel_label(fit)}: {lost} samples have no finite prediction.")
+        if lost < len(finite):
+            kept.append(
+                replace(
+                    fit, time=fit.time[finite], measured=fit.measured[finite], predicted=fit.predicted[finite]
+                )
+            )
+    return tuple(kept), tuple(notes)
 
 
 def channel_label(fit: ChannelFit) -> str:

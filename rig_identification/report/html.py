@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from rig_identification import __version__
 from rig_identification.recording import Session
-from rig_identification.report.channels import recording_views
+from rig_identification.report.channels import finite_channels, recording_views
 from rig_identification.report.determined import determinations, sensors_used
 from rig_identification.report.doubts import doubt_groups
 from rig_identification.report.findings import alternative_rows, finding_views, shifts
@@ -55,18 +55,18 @@ def write_report(identification: Identification, session: Session, path: Path) -
 
 def _chapters(identification: Identification, session: Session) -> dict[str, object]:
     roles = {r.name: "at rest" if r.kind == "static" else ROLES[r.holdout] for r in session.recordings}
-    recordings = recording_views(identification.channels, roles)
+    channels, lost = finite_channels(identification.channels)
+    recordings = recording_views(channels, roles)
     names = [view.name for view in recordings]
     return {
         "session": session,
         "identification": identification,
         "roles": roles,
+        "notes": (*identification.notes, *lost),
         "blocks": blocks(identification),
         "recordings": recordings,
-        "rms_rows": rms_table(identification.channels, names),
-        "whiteness": [
-            (v, whiteness_views(identification.channels, v.name)) for v in recordings if v.role != "at rest"
-        ],
+        "rms_rows": rms_table(channels, names),
+        "whiteness": [(v, whiteness_views(channels, v.name)) for v in recordings if v.role != "at rest"],
         "findings": finding_views(identification.mismatch),
         "alternatives": alternative_rows(identification.mismatch),
         "shifts": shifts(identification),

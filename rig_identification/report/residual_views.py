@@ -15,6 +15,7 @@ from rig_identification.report.residuals import ResidualSummary, summarise_resid
 from rig_identification.result import ChannelFit
 
 WIDTH, HEIGHT = 300, 84  # px
+ORDINARY = 1.1  # a residual's size, in units of its noise, that needs no attention
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Cell:
 
     rms: float
     anchor: str
-    heat: int  # percent: 0 as noise, 100 ten times the noise
+    heat: int  # percent: 0 as noise, 100 some ten times the noise
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def rms_table(channels: tuple[ChannelFit, ...], recordings: list[str]) -> list[R
     found: dict[str, dict[str, Cell]] = {}
     for fit in channels:
         rms = fit.rms_in_sigma
-        heat = int(np.clip(100.0 * np.log10(max(rms, 1e-3) / 1.1), 0.0, 100.0))
+        heat = 0 if rms <= ORDINARY else round(min(25.0 + 75.0 * np.log10(rms / ORDINARY), 100.0))
         found.setdefault(channel_label(fit), {})[fit.recording] = Cell(rms, channel_anchor(fit), heat)
     return [Row(label, tuple(cells.get(name) for name in recordings)) for label, cells in found.items()]
 
