@@ -61,8 +61,9 @@ def draw_scene(seed: int, duration: float) -> Scene:
     errors = _draw_errors(rng, len(geometry.length))
     rig = _describe(rng, geometry, body, devices)
     plans = _draw_plans(rng, body, geometry, duration)
-    geometry = _tilt_ceiling(rng, geometry)
-    return Scene(seed, name, rig, body, geometry, devices, errors, plans)
+    level = np.array([*_normal(rng, DEFAULT_TOLERANCE["level"], 2), 0.0])
+    geometry = replace(geometry, ceiling=Rotation.from_rotvec(level).apply(geometry.ceiling))
+    return Scene(seed, name, rig, body, geometry, devices, errors, level, plans)
 
 
 def scaled(plan: Plan, share: float) -> Plan:
@@ -197,12 +198,6 @@ def _describe(rng: np.random.Generator, geometry: Geometry, body: Body, devices:
 def _mount(rng: np.random.Generator, position: Array, rotation: Array, far: float, turned: float) -> Mount:
     believed = Rotation.from_matrix(rotation) * Rotation.from_rotvec(_normal(rng, turned, 3))
     return Mount(_rounded(position + _normal(rng, far, 3)), believed.as_quat())
-
-
-def _tilt_ceiling(rng: np.random.Generator, geometry: Geometry) -> Geometry:
-    """Turn the ceiling points as a whole: the lab's "vertical" is not quite one."""
-    tilt = Rotation.from_rotvec([*_normal(rng, DEFAULT_TOLERANCE["level"], 2), 0.0])
-    return replace(geometry, ceiling=tilt.apply(geometry.ceiling))
 
 
 def _draw_plans(

@@ -7,37 +7,19 @@ MuJoCo's constraints are springs in disguise: with a time constant of two steps 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from bench.concealed.effects.base import Effect, State
+from bench.concealed.effects.place import level_origin
 from bench.concealed.kinematics import predict, put_body_force
+from bench.concealed.mechanism import STEP, add_rigid_cables, give_mass, rigid_tension, set_lengths
 from bench.concealed.scene import Array, Plan, Scene
+from bench.concealed.signals import Trajectory
 
-STEP = 0.0005  # s
 RECORD_EVERY = 2  # steps
-CONSTRAINT_TIME = 2.0 * STEP  # s: the shortest that MuJoCo keeps stable
 OIL = 5.0  # 1/s, damping per mass while the body settles
-IMPEDANCE = 0.9999  # MuJoCo's largest
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """True motion, sampled every ``STEP * RECORD_EVERY`` from the release on."""
-
-    time: Array  # (n,) s
-    position: Array  # (n, 3) m, body origin in world
-    quaternion: Array  # (n, 4) xyzw, body to world
-    velocity: Array  # (n, 3) m/s, body origin, world
-    rate: Array  # (n, 3) rad/s, body
-    acceleration: Array  # (n, 3) m/s^2, body origin, world
-    rate_change: Array  # (n, 3) rad/s^2, body
-    tension: Array  # (n, cables) N, at the end that carries the load cell
-    force: Array  # (n, 3) N, exciter on body, exciter frame
-    shaft: Array  # (n, 2) rad, rad/s
-    stretch: Array  # (n, cables) m, length less described true length
 
 
 class Engine:
@@ -46,14 +28,17 @@ class Engine:
     def __init__(self, scene: Scene, effects: Sequence[Effect], plan: Plan) -> None:
         self.scene, self.plan = scene, plan
         self.effects = [e for e in effects if e.mechanical]
-        self.forcing = [e for e in self.effects if type(e).force is not Effect.force]
+        laws = [e.bind(scene) for e in self.effects]
+        self.forcing = [law for law in laws if law is not None]
+        self.driving = [e for e in self.effects if e.drives]
         self.model = self._compile()
         self.data = mujoco.MjData(self.model)
         # Views into MuJoCo's own arrays: asking for them anew at every step costs more than the step.
         self._pose, self._velocity = self.data.qpos, self.data.qvel
         self._acceleration, self._applied = self.data.qacc, self.data.qfrc_applied
         self.cables = len(scene.geometry.length)
-        self._adjust_lengths()
+        if not any(e.own_cables for e in self.effects):
+            set_lengths(self.model, scene.geometry.length)
 
     def _compile(self) -> mujoco.MjModel:
         scene, plan = self.scene, self.plan
@@ -67,26 +52,23 @@ class Engine:
         spec.compiler.degree = False
         body = spec.worldbody.add_body(name="body")
         body.add_freejoint(name="body")
-        _give_mass(body, scene.body.mass, scene.body.center_of_mass, scene.body.inertia)
+        whole = scene.body
+        for effect in self.effects:
+            whole = effect.rigid_part(whole)
+        give_mass(body, whole.mass, whole.center_of_mass, whole.inertia)
         if plan.dummy_mass > 0.0:
             dummy = body.add_body(name="dummy", pos=plan.dummy_position)
-            _give_mass(dummy, plan.dummy_mass, np.zeros(3), 1e-9 * np.eye(3))
+            give_mass(dummy, plan.dummy_mass, np.zeros(3), 1e-9 * np.eye(3))
+        plates = [e.ceiling(spec, scene) for e in self.effects]
+        ceiling = next((p for p in plates if p is not None), spec.worldbody)
         for i, (top, hinge) in enumerate(zip(scene.geometry.ceiling, scene.geometry.hinge, strict=True)):
-            spec.worldbody.add_site(name=f"ceiling_{i}", pos=top)
+            ceiling.add_site(name=f"ceiling_{i}", pos=top)
             body.add_site(name=f"hinge_{i}", pos=hinge)
-        if not any(effect.own_cables for effect in self.effects):
-            add_cables(spec, scene)
+        if not any(e.own_cables for e in self.effects):
+            add_rigid_cables(spec, scene)
         for effect in self.effects:
             effect.build(spec, scene, plan)
         return spec.compile()
-
-    def _adjust_lengths(self) -> None:
-        """Set each rigid cable to its true length, whatever pose the model was compiled in."""
-        for i, length in enumerate(self.scene.geometry.length):
-            row = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, f"cable_{i}")
-            if row >= 0:
-                tendon = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_TENDON, f"cable_{i}")
-                self.model.eq_data[row, 0] = length - self.model.tendon_length0[tendon]
 
     def load(self, time: float, force: Array, ahead: float = 0.0, hold: float = 0.0) -> None:
         """Apply the exciter's ``force`` (body axes), the effects and ``hold`` times the start pull.
@@ -99,10 +81,12 @@ class Engine:
         if hold:
             applied[:3] += hold * self.plan.pull
             applied[3:6] += hold * np.cross(self.plan.pull_point, rotation.T @ self.plan.pull)
-        if self.forcing:
-            state = State(time, position, rotation, velocity, rate)
-            for effect in self.forcing:
-                applied[:6] += effect.force(state)
+        if self.forcing or self.driving:
+            state = State(self.plan.name, time, position, rotation, velocity, rate)
+            for law in self.forcing:
+                applied[:6] += law(state)
+            for effect in self.driving:
+                effect.drive(self.model, self.data, state)
 
     def rest(self, hold: float = 0.0) -> float:
         """Move to equilibrium: damped motion first, then Newton's method; return the acceleration left."""
@@ -131,19 +115,8 @@ class Engine:
 
     def _guess(self) -> None:
         self.data.qpos[:] = self.model.qpos0
-        self.data.qpos[:7] = [*self._described_origin(), 1.0, 0.0, 0.0, 0.0]
+        self.data.qpos[:7] = [*level_origin(self.scene), 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:] = 0.0
-
-    def _described_origin(self) -> Array:
-        """Where the body origin is if the body hangs level: what the cables allow, least squares."""
-        geometry = self.scene.geometry
-        origin = np.mean(geometry.ceiling - geometry.hinge, axis=0) - [0.0, 0.0, np.mean(geometry.length)]
-        for _ in range(50):
-            arm = origin + geometry.hinge - geometry.ceiling
-            length = np.linalg.norm(arm, axis=1)
-            jacobian = arm / length[:, None]
-            origin = origin - np.linalg.lstsq(jacobian, length - geometry.length, rcond=None)[0]
-        return origin
 
     def _acceleration_at_rest(self, pose: Array, hold: float) -> Array:
         self.data.qpos[:] = pose
@@ -236,9 +209,7 @@ class Engine:
     @property
     def steps(self) -> int:
         """Steps that cover the recording, its late start included."""
-        return RECORD_EVERY * int(
-            round((self.plan.duration + self.plan.first_sample) / (STEP * RECORD_EVERY))
-        )
+        return RECORD_EVERY * round((self.plan.duration + self.plan.first_sample) / (STEP * RECORD_EVERY))
 
     def _row(self) -> Array:
         data = self.data
@@ -251,7 +222,7 @@ class Engine:
             tension = effect.tension(self.model, self.data, self.scene)
             if tension is not None:
                 return tension
-        return cable_tension(self.data, self.cables)
+        return rigid_tension(self.data, self.cables)
 
     def _trajectory(self, rows: Array, shaft: Array, force: Array) -> Trajectory:
         n = self.cables
@@ -269,32 +240,3 @@ class Engine:
             shaft=shaft,
             stretch=rows[:, 19 + n : 19 + 2 * n],
         )
-
-
-def add_cables(spec: mujoco.MjSpec, scene: Scene) -> None:
-    """Add the rigid cables."""
-    for i in range(len(scene.geometry.length)):
-        tendon = spec.add_tendon(name=f"cable_{i}")
-        tendon.wrap_site(f"ceiling_{i}")
-        tendon.wrap_site(f"hinge_{i}")
-        spec.add_equality(
-            name=f"cable_{i}",
-            type=mujoco.mjtEq.mjEQ_TENDON,
-            name1=f"cable_{i}",
-            solref=[CONSTRAINT_TIME, 1.0],
-            solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-        )
-
-
-def cable_tension(data: mujoco.MjData, cables: int) -> Array:
-    """(cables,) force of the tendon equalities, positive when they pull."""
-    # MuJoCo lists equalities first, in the order they were added: an effect's own come after the cables.
-    return np.asarray(-data.efc_force[:cables])
-
-
-def _give_mass(body: mujoco.MjsBody, mass: float, center: Array, inertia: Array) -> None:
-    body.explicitinertial = True
-    body.mass = mass
-    body.ipos = center
-    j = inertia
-    body.fullinertia = [j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]]

@@ -48,7 +48,7 @@ def predict(
 
 @njit(cache=True)
 def put_body_force(applied: Array, rotation: Array, force_body: Array, point_body: Array) -> None:
-    """Set ``applied`` (6+,) to the generalised force of ``force_body`` at ``point_body``, both in body axes."""
+    """Set ``applied`` (6+,) to the generalised force of a force at a point, both (3,) in body axes."""
     applied[:] = 0.0
     for i in range(3):
         for j in range(3):
@@ -61,23 +61,21 @@ def put_body_force(applied: Array, rotation: Array, force_body: Array, point_bod
 @njit(cache=True)
 def hinge_rates(
     ceiling: Array, hinge: Array, position: Array, rotation: Array, velocity: Array, rate: Array
-) -> tuple[Array, Array, Array]:
-    """By cable: unit vector to the body (n, 3), angular rate of the cable and of the body against it (n, 3).
+) -> tuple[Array, Array]:
+    """By cable: angular rate of the cable (n, 3), and of the body against it (n, 3).
 
     World axes. The cable does not spin about itself: its rate is u x du/dt.
     """
     count = ceiling.shape[0]
-    along, top, bottom = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    top, bottom = np.empty((count, 3)), np.empty((count, 3))
     spin = rotation @ rate
     for i in range(count):
         arm = rotation @ hinge[i]
         span = position + arm - ceiling[i]
         speed = velocity + np.cross(spin, arm)
-        length = np.sqrt(np.dot(span, span))
-        along[i] = span / length
-        top[i] = np.cross(span, speed) / length**2
+        top[i] = np.cross(span, speed) / np.dot(span, span)
         bottom[i] = spin - top[i]
-    return along, top, bottom
+    return top, bottom
 
 
 @njit(cache=True)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bench.concealed.effects.base import Effect
-from bench.concealed.engine import Trajectory
 from bench.concealed.scene import Array, Plan, Scene
+from bench.concealed.signals import Readings, Samples, Trajectory
 from rig_identification.recording import Dummy, Recording, Series
 
 # Device: (first sample after the recording's start, interval), in milliseconds.
@@ -24,27 +24,6 @@ SCHEDULE = {
 CABLE_STAGGER, CABLE_INTERVAL = 8, 2
 START_NS = 1_793_000_000_000_000_000
 BETWEEN_RECORDINGS_NS = 300_000_000_000
-
-
-@dataclass(frozen=True)
-class Readings:
-    """What the sensors feel, every millisecond, free of noise and of ordinary errors."""
-
-    time: Array  # (n,) s after the release
-    tension: Array  # (n, cables) N
-    force: Array  # (n, 3) N, exciter frame
-    shaft: Array  # (n, 2) rad, rad/s
-    rate: Array  # (n, 3) rad/s, imu frame
-    specific_force: Array  # (n, 3) m/s^2, imu frame
-    inclination: Array  # (n, 2) rad
-
-
-@dataclass(frozen=True)
-class Samples:
-    """What one device sends: time on its own clock, seconds after the release."""
-
-    time: Array  # (n,)
-    values: Array  # (n, width)
 
 
 def sense(trajectory: Trajectory, scene: Scene) -> Readings:

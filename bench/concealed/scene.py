@@ -126,4 +126,5 @@ class Scene:
     geometry: Geometry
     devices: Devices
     errors: SensorErrors
+    level: Array  # (3,) rotation vector, rad: turns described ceiling points into true ones
     plans: tuple[Plan, ...]

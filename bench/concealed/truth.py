@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bench.concealed.effects.base import Effect
-from bench.concealed.engine import Trajectory
-from bench.concealed.measure import Samples
+from bench.concealed.inertia import take_away
 from bench.concealed.scene import Body, Scene
+from bench.concealed.signals import Samples, Trajectory
 
 # Channel of "effect_over_noise": devices, columns, name of the noise.
 CHANNELS = {
@@ -24,24 +24,21 @@ CHANNELS = {
 
 def describe(scene: Scene, effects: Sequence[Effect], paths: Sequence[Trajectory]) -> dict[str, Any]:
     """Everything a scorer needs to know; no estimate may read it."""
-    body, names = scene.body, scene.geometry.names
-    found = [{"effect": e.name, **e.truth()} for e in effects]
-    for entry in found:
-        entry.setdefault("where", {})
-        entry.setdefault("accept", [entry["effect"]])
-    outside = any(e.outside for e in effects)
+    names, rigid = scene.geometry.names, scene.body
+    for effect in effects:
+        rigid = effect.rigid_part(rigid)
+    found = [_finding(e, scene, paths) for e in effects]
     accept = sorted({a for entry in found for a in entry["accept"]}) or ["none"]
     return {
         "case": f"concealed_{scene.seed}",
         "seed": scene.seed,
         "rig_desc": scene.geometry_name,
-        "mass": body.mass,
-        "center_of_mass": body.center_of_mass.tolist(),
-        "inertia": body.inertia.tolist(),
+        **_body(scene.body),
+        "rigid_part": _body(rigid),
         "without_frame": _without_frame(scene),
         "effects": found,
-        "outside": outside,
-        "accept_first": ["unknown"] if outside and accept == ["none"] else accept,
+        "outside": any(e.outside for e in effects),
+        "accept_first": accept,
         "verdict": _verdicts(effects),
         "sensor_biases": _errors(scene),
         "true_rig": {
@@ -57,6 +54,19 @@ def describe(scene: Scene, effects: Sequence[Effect], paths: Sequence[Trajectory
             "exciter_orientation": Rotation.from_matrix(scene.devices.exciter_rotation).as_quat().tolist(),
         },
         "runs": {p.name: _run(scene, k, paths[k]) for k, p in enumerate(scene.plans)},
+    }
+
+
+def _finding(effect: Effect, scene: Scene, paths: Sequence[Trajectory]) -> dict[str, Any]:
+    truth = effect.truth()
+    where = {"channel": None, "axis": None, **truth.get("where", {}), **(effect.observe(scene, paths) or {})}
+    return {
+        "effect": effect.name,
+        "outside": effect.outside,
+        "where": where,
+        "parameters": truth["parameters"],
+        "accept": ["unknown"] if effect.outside else [effect.name],
+        "near": list(effect.near),
     }
 
 
@@ -106,28 +116,15 @@ def _without_frame(scene: Scene) -> dict[str, Any] | None:
     frame = scene.rig.frame
     if frame is None:
         return None
-    whole = scene.body
-    mass = whole.mass - frame.mass
-    center = (whole.mass * whole.center_of_mass - frame.mass * frame.center_of_mass) / mass
-    about = _about_origin(whole) - _about_origin(Body(frame.mass, frame.center_of_mass, frame.inertia))
-    inertia = about - mass * _steiner(center)
-    return {"mass": mass, "center_of_mass": center.tolist(), "inertia": inertia.tolist()}
+    return _body(take_away(scene.body, Body(frame.mass, frame.center_of_mass, frame.inertia)))
 
 
-def _about_origin(body: Body) -> Any:
-    return body.inertia + body.mass * _steiner(body.center_of_mass)
-
-
-def _steiner(arm: Any) -> Any:
-    return float(arm @ arm) * np.eye(3) - np.outer(arm, arm)
-
-
-def add_point(body: Body, mass: float, position: Any) -> Body:
-    """The body with a point mass fixed to it (a negative one takes it away)."""
-    total = body.mass + mass
-    center = (body.mass * body.center_of_mass + mass * position) / total
-    about = _about_origin(body) + mass * _steiner(position)
-    return Body(total, center, about - total * _steiner(center))
+def _body(body: Body) -> dict[str, Any]:
+    return {
+        "mass": body.mass,
+        "center_of_mass": body.center_of_mass.tolist(),
+        "inertia": body.inertia.tolist(),
+    }
 
 
 def channel_differences(

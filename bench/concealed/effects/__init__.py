@@ -1,22 +1,60 @@
-"""Effects, one a file; :data:`CATALOGUE` holds the contract's table, :data:`OUTSIDE` what is not in it."""
+"""Effects, one a file: :data:`CATALOGUE` holds the contract's table, :data:`OUTSIDE` what is not in it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+import pkgutil
 
 import numpy as np
 
 from bench.concealed.effects.base import Effect
+from bench.concealed.scene import Scene
 
-if TYPE_CHECKING:
-    from bench.concealed.scene import Scene
+CLEAN_SHARE, PAIR_SHARE, OUTSIDE_SHARE = 1 / 3, 0.1, 0.15
 
-CATALOGUE: dict[str, type[Effect]] = {}
-OUTSIDE: dict[str, type[Effect]] = {}
+
+def _collect() -> dict[str, type[Effect]]:
+    for module in pkgutil.iter_modules(__path__):
+        importlib.import_module(f"{__name__}.{module.name}")
+    return {e.name: e for e in sorted(Effect.__subclasses__(), key=lambda e: e.name)}
+
+
+_ALL = _collect()
+CATALOGUE = {name: effect for name, effect in _ALL.items() if not effect.outside}
+OUTSIDE = {name: effect for name, effect in _ALL.items() if effect.outside}
 
 
 def draw_effects(rng: np.random.Generator, scene: Scene, kind: str, size: float | None) -> list[Effect]:
-    """The effects that ``kind`` asks for, of random place and, if ``size`` is None, of random size."""
+    """The effects that ``kind`` asks for, of random place and, if ``size`` is None, of random size.
+
+    ``kind``: "clean", "single", "pair", "outside", "random", an effect's name, or several joined by "+".
+    """
+    names = _names(rng, kind)
+    unknown = [n for n in names if n not in _ALL]
+    if unknown:
+        raise ValueError(f"no effect {unknown[0]!r}: choose from {', '.join(_ALL)}")
+    sizes = [float(rng.uniform()) if size is None else size for _ in names]
+    return [_ALL[n].draw(rng, scene, s) for n, s in zip(names, sizes, strict=True)]
+
+
+def _names(rng: np.random.Generator, kind: str) -> list[str]:
+    if kind == "random":
+        shares = [CLEAN_SHARE, PAIR_SHARE, OUTSIDE_SHARE]
+        kind = str(rng.choice(["clean", "pair", "outside", "single"], p=[*shares, 1.0 - sum(shares)]))
     if kind == "clean":
         return []
-    raise ValueError(f"unknown kind of session: {kind!r}")
+    if kind == "single":
+        return [str(rng.choice(list(CATALOGUE)))]
+    if kind == "outside":
+        return [str(rng.choice(list(OUTSIDE)))]
+    if kind == "pair":
+        return _pair(rng)
+    return kind.split("+")
+
+
+def _pair(rng: np.random.Generator) -> list[str]:
+    """Two of the table that can be in one mechanism."""
+    while True:
+        pair = [str(n) for n in rng.choice(list(CATALOGUE), 2, replace=False)]
+        if sum(CATALOGUE[n].own_cables for n in pair) < 2 and "cable_slack" not in pair:
+            return pair

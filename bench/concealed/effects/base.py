@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from bench.concealed.measure import Readings, Samples
-    from bench.concealed.scene import Plan, Scene
-
-Array = NDArray[np.float64]
+from bench.concealed.scene import Array, Body, Plan, Scene
+from bench.concealed.signals import Readings, Samples, Trajectory
 
 
 @dataclass(frozen=True)
 class State:
     """Motion of the body at one instant."""
 
+    recording: str
     time: float  # s after the release; negative while the body is brought to rest
     position: Array  # (3,) m, body origin in world
     rotation: Array  # (3, 3) body to world
@@ -27,13 +25,14 @@ class State:
 
     def point(self, position: Array) -> tuple[Array, Array]:
         """World position (3,) and velocity (3,) of a point given in body coordinates."""
-        arm = self.rotation @ position
-        return self.position + arm, self.velocity + self.rotation @ np.cross(self.rate, position)
+        return (
+            self.position + self.rotation @ position,
+            self.velocity + self.rotation @ np.cross(self.rate, position),
+        )
 
     def wrench_at(self, position: Array, force_world: Array) -> Array:
         """(6,) generalised force of a world force at a body point."""
-        moment = np.cross(position, self.rotation.T @ force_world)
-        return np.concatenate([force_world, moment])
+        return np.concatenate([force_world, np.cross(position, self.rotation.T @ force_world)])
 
 
 class Effect:
@@ -41,8 +40,9 @@ class Effect:
 
     name = ""  # a word of the contract's table, or of its own for one from outside
     outside = False  # not in the contract's table
-    own_cables = False  # the effect replaces the rigid cables by its own
+    near: tuple[str, ...] = ()  # from outside: words of the table that a fair judge might let pass
     mechanical = False  # the motion changes, not only what is read
+    own_cables = False  # the effect replaces the rigid cables by its own
 
     @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> Effect:
@@ -50,12 +50,20 @@ class Effect:
         raise NotImplementedError
 
     def truth(self) -> dict[str, Any]:
-        """``where``, ``parameters`` and whatever else a scorer needs, in the contract's words and units."""
+        """``where`` and ``parameters``, in the contract's words and units."""
         raise NotImplementedError
 
     def alter(self, scene: Scene) -> Scene:
         """The scene as it truly is; the description stays as it was."""
         return scene
+
+    def rigid_part(self, body: Body) -> Body:
+        """What is left of the whole body once the parts that this effect sets free are taken out."""
+        return body
+
+    def ceiling(self, spec: Any, scene: Scene) -> Any:
+        """The MuJoCo body that carries the ceiling points, None for the room itself."""
+        return None
 
     def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
         """Add to the mechanism: bodies, springs, and the cables themselves if they are :attr:`own_cables`."""
@@ -66,20 +74,45 @@ class Effect:
 
     def force(self, state: State) -> Array:
         """(6,) force on the body: force in world, moment about the body origin in body axes."""
-        return np.zeros(6)
+        raise NotImplementedError
+
+    def bind(self, scene: Scene) -> Callable[[State], Array] | None:
+        """The force law for this scene, None if the effect puts no force of its own on the body."""
+        return None if type(self).force is Effect.force else self.force
+
+    def drive(self, model: Any, data: Any, state: State) -> None:
+        """Change the mechanism while it runs."""
+
+    @property
+    def drives(self) -> bool:
+        """Whether :meth:`drive` does anything."""
+        return type(self).drive is not Effect.drive
 
     def distort(self, readings: Readings, scene: Scene, plan: Plan) -> Readings:
-        """What the sensors sense, dense and free of noise."""
+        """What the sensors feel, every millisecond and free of noise."""
         return readings
 
     def corrupt(self, device: str, samples: Samples, scene: Scene, plan: Plan) -> Samples:
         """What one device sends, noise included."""
         return samples
 
+    def observe(self, scene: Scene, paths: Sequence[Trajectory]) -> dict[str, Any] | None:
+        """What of ``where`` only the motion tells; None if the effect did not show at all."""
+        return {}
+
+    def stronger(self) -> Effect:
+        """What to try if :meth:`observe` saw nothing."""
+        return self
+
 
 def log_size(size: float, faint: float, strong: float) -> float:
     """A value between ``faint`` (size 0) and ``strong`` (size 1), evenly in its logarithm."""
     return float(faint * (strong / faint) ** size)
+
+
+def signed(rng: np.random.Generator, value: float) -> float:
+    """The value or its opposite."""
+    return float(rng.choice([-1.0, 1.0]) * value)
 
 
 def quantity(value: float, unit: str) -> dict[str, Any]:

@@ -1,0 +1,68 @@
+"""The cables stretch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bench.concealed.effects.base import Effect, log_size, quantity
+from bench.concealed.effects.place import released_aside
+from bench.concealed.scene import Array, Plan, Scene
+
+
+@dataclass(frozen=True)
+class CableElasticity(Effect):
+    """Every cable a spring EA / length that only pulls, with a damper beside it.
+
+    The damper is 2 zeta sqrt(k m / n): zeta of critical for the cable's share of the body.
+    """
+
+    name = "cable_elasticity"
+    mechanical = True
+    own_cables = True
+    axial_stiffness: float  # N
+    damping_ratio: float  # 1
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> CableElasticity:
+        """From wire rope of a crane down to webbing."""
+        return cls(log_size(size, 1e8, 1e6), float(np.exp(rng.uniform(np.log(0.003), np.log(0.05)))))
+
+    def truth(self) -> dict[str, Any]:
+        """See :class:`Effect`."""
+        parameters = {
+            "axial_stiffness": quantity(self.axial_stiffness, "N"),
+            "damping_ratio": quantity(self.damping_ratio, "1"),
+        }
+        return {"parameters": parameters}
+
+    def alter(self, scene: Scene) -> Scene:
+        """A body on springs is released from rest aside: from the level pose it would drop and bounce."""
+        return released_aside(scene)
+
+    def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
+        """See :class:`Effect`."""
+        stiffness, damping = self._constants(scene)
+        for i, length in enumerate(scene.geometry.length):
+            tendon = spec.add_tendon(
+                name=f"cable_{i}",
+                stiffness=stiffness[i],
+                damping=damping[i],
+                springlength=[0.0, length],
+            )
+            tendon.wrap_site(f"ceiling_{i}")
+            tendon.wrap_site(f"hinge_{i}")
+
+    def tension(self, model: Any, data: Any, scene: Scene) -> Array:
+        """See :class:`Effect`."""
+        stiffness, damping = self._constants(scene)
+        n = len(stiffness)
+        stretch = np.maximum(data.ten_length[:n] - scene.geometry.length, 0.0)
+        return np.asarray(stiffness * stretch + damping * data.ten_velocity[:n])
+
+    def _constants(self, scene: Scene) -> tuple[Array, Array]:
+        stiffness = self.axial_stiffness / scene.geometry.length
+        share = scene.body.mass / len(stiffness)
+        return stiffness, 2.0 * self.damping_ratio * np.sqrt(stiffness * share)

@@ -1,0 +1,79 @@
+"""A cable goes slack and snaps tight again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bench.concealed.draw import scaled
+from bench.concealed.effects.base import Effect, quantity
+from bench.concealed.mechanism import CONSTRAINT_TIME, IMPEDANCE
+from bench.concealed.scene import Array, Plan, Scene
+from bench.concealed.signals import Trajectory
+
+
+@dataclass(frozen=True)
+class CableSlack(Effect):
+    """Cables that only pull, in runs violent enough that one of them goes slack."""
+
+    name = "cable_slack"
+    mechanical = True
+    own_cables = True
+    violence: float  # how much more pull and force than the calm run has
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> CableSlack:
+        """The runs grow until a cable is slack; a larger size goes on from there."""
+        return cls(1.2 + 0.6 * size)
+
+    def truth(self) -> dict[str, Any]:
+        """The times follow from the motion: see :meth:`observe`."""
+        return {"parameters": {"violence": quantity(self.violence, "1")}}
+
+    def alter(self, scene: Scene) -> Scene:
+        """See :class:`Effect`."""
+        plans = tuple(scaled(p, self.violence) for p in scene.plans)
+        return replace(scene, plans=plans)
+
+    def stronger(self) -> CableSlack:
+        """What to try if no cable went slack."""
+        return replace(self, violence=1.4 * self.violence)
+
+    def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
+        """See :class:`Effect`."""
+        for i, length in enumerate(scene.geometry.length):
+            tendon = spec.add_tendon(
+                name=f"cable_{i}",
+                limited=True,
+                range=[0.0, length],
+                solref_limit=[CONSTRAINT_TIME, 1.0],
+                solimp_limit=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+            )
+            tendon.wrap_site(f"ceiling_{i}")
+            tendon.wrap_site(f"hinge_{i}")
+
+    def tension(self, model: Any, data: Any, scene: Scene) -> Array:
+        """See :class:`Effect`."""
+        out = np.zeros(len(scene.geometry.length))
+        for row in np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON):
+            out[data.efc_id[row]] = data.efc_force[row]
+        return out
+
+    def observe(self, scene: Scene, paths: Sequence[Trajectory]) -> dict[str, Any] | None:
+        """Channel and times of slack, None if no cable went slack."""
+        times, slack_time = [], np.zeros(len(scene.geometry.length))
+        for plan, path in zip(scene.plans, paths, strict=True):
+            slack = path.tension < 1.0
+            slack_time += slack.sum(axis=0)
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], slack.any(axis=1), [0]])))
+            for first, last in zip(edges[::2], edges[1::2], strict=True):
+                start, end = (path.time[first], path.time[last - 1]) - np.array(plan.first_sample)
+                if end > 0.0:
+                    times.append({"recording": plan.name, "start": float(max(start, 0.0)), "end": float(end)})
+        if not times:
+            return None
+        return {"channel": f"cable_{int(np.argmax(slack_time)) + 1}", "times": times}

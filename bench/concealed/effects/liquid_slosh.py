@@ -1,0 +1,62 @@
+"""Liquid swings in a tank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bench.concealed.effects.base import Effect, log_size, quantity
+from bench.concealed.effects.place import released_aside, tank
+from bench.concealed.inertia import add_point
+from bench.concealed.mechanism import give_mass
+from bench.concealed.scene import Array, Body, Plan, Scene
+
+
+@dataclass(frozen=True)
+class LiquidSlosh(Effect):
+    """A pendulum in the body; the truth's inertia holds its mass at its rest, the body level."""
+
+    name = "liquid_slosh"
+    mechanical = True
+    mass: float  # kg
+    frequency: float  # Hz
+    damping_ratio: float  # 1
+    position: Array  # (3,) m, body, of the liquid at rest
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> LiquidSlosh:
+        """A tank low in the body."""
+        place = tank(rng, scene)
+        mass = log_size(size, 0.0005, 0.05) * scene.body.mass
+        damping = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05))))
+        return cls(mass, rng.uniform(0.5, 1.6), damping, place)
+
+    def truth(self) -> dict[str, Any]:
+        """See :class:`Effect`."""
+        parameters = {
+            "mass": quantity(self.mass, "kg"),
+            "frequency": quantity(self.frequency, "Hz"),
+            "damping_ratio": quantity(self.damping_ratio, "1"),
+        }
+        return {"where": {"position": self.position.tolist()}, "parameters": parameters}
+
+    def alter(self, scene: Scene) -> Scene:
+        """See :class:`Effect`."""
+        return released_aside(scene)
+
+    def rigid_part(self, body: Body) -> Body:
+        """See :class:`Effect`."""
+        return add_point(body, -self.mass, self.position)
+
+    def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
+        """See :class:`Effect`."""
+        circular = 2.0 * np.pi * self.frequency
+        length = scene.rig.gravity / circular**2
+        bob = spec.body("body").add_body(name="liquid", pos=self.position + np.array([0.0, 0.0, length]))
+        give_mass(bob, self.mass, np.array([0.0, 0.0, -length]), 1e-9 * np.eye(3))
+        damping = 2.0 * self.damping_ratio * circular * self.mass * length**2
+        for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]):
+            bob.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, damping=damping)
