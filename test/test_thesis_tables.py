@@ -1,5 +1,7 @@
 """The tables are those of the thesis, and what they say holds together or stands in the remarks."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -180,7 +182,7 @@ def _motion(case, instants):
     attitude = Rotation.from_quat(case.orientation).as_matrix()
     state = np.concatenate([case.position + attitude @ case.center_of_mass, attitude.ravel(), np.zeros(6)])
     edges = [0.0, *[t for t in case.force.breaks if t < instants], instants]
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in pairwise(edges):
         inside = (start, np.nextafter(end, start))
         state = solve_ivp(slope, inside, state, method="DOP853", rtol=1e-9, atol=1e-10).y[:, -1]
     return state[:3], state[3:12].reshape(3, 3)
@@ -196,7 +198,8 @@ def test_case_7_comes_back_with_the_corner_force_along_world_axes():
 
 def test_every_case_explains_itself():
     for case in CASES:
-        assert case.remarks and all(remark == remark.strip() and remark for remark in case.remarks)
+        assert case.remarks
+        assert all(remark and remark == remark.strip() for remark in case.remarks)
 
 
 def test_force_program_follows_the_table():

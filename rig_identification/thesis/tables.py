@@ -12,7 +12,7 @@ import json
 from importlib import resources
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
 
 from rig_identification.errors import InputError
 
@@ -20,8 +20,9 @@ CASE_NUMBERS = tuple(range(1, 19))
 
 
 def _read(name: str) -> dict[str, Any]:
-    text = resources.files("rig_identification.thesis").joinpath("tables", name).read_text(encoding="utf-8")
-    table: dict[str, Any] = yaml.safe_load(text)
+    folder = resources.files("rig_identification.thesis") / "tables"
+    text = (folder / name).read_text(encoding="utf-8")
+    table: dict[str, Any] = YAML(typ="safe", pure=True).load(text)
     return table
 
 

@@ -1,0 +1,301 @@
+"""Chapter 2 of the thesis: the centre of mass of a body from how it hangs, bare and with a dummy.
+
+The thesis picks three of the four moment equations of its two experiments and solves them with
+the poses one after the other. Here everything stands in one adjustment
+(:mod:`static_model`, :mod:`adjustment`): all four moments, tensions where they are measured,
+and the tolerances of the rig, so that the covariance is that of all of them together.
+
+What the equations tell: with the attitude from two inclinations, each recording gives one
+vertical line in the body on which its combined centre of mass lies. Bare alone leaves the
+height along that line open; the dummy tilts the body, and two lines meet in one point. A rig
+whose attitude does not change with the load (parallel cables of a trapeze) never tells the
+height. Without load cells the tensions follow from forces and the moment about the vertical,
+four equations: with more than four cables, or parallel ones, tensions, and with them the
+centre of mass, stay open until they are measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from rig_identification.errors import InputError
+from rig_identification.rig import CarryingFrame, Rig
+from rig_identification.statics.adjustment import Adjusted, adjust
+from rig_identification.statics.balance import balance, is_stable, skew, undetermined_tensions
+from rig_identification.statics.equilibrium import hanging_mass
+from rig_identification.statics.observation import StaticObservation, mount, up_in_body
+from rig_identification.statics.poses import HangingPose, poses_with_known_inclination, poses_with_known_mass
+from rig_identification.statics.static_model import StaticModel, StaticState
+
+Array = NDArray[np.float64]
+
+AXES = ("cx", "cy", "cz")
+FITS = ("determined", "undetermined")
+IMPROBABLE = 1e-6  # chance of a larger misfit below which readings and description disagree
+VAGUE = 0.25  # of the hinges' span: an element known less well than this is not known
+RIVAL = 25.0  # chi squared by which a second solution may be worse and still be one
+
+
+@dataclass(frozen=True)
+class StaticPose:
+    """Where the body hung in one recording."""
+
+    name: str
+    position: Array  # (3,) m, body origin in world
+    orientation: Array  # (4,) quaternion xyzw, rotates body vectors into world
+    tension: Array  # (n,) N
+    tension_std: Array  # (n,) N; infinite where open
+    undetermined_tensions: int  # combinations that lengths and balance leave open
+
+
+@dataclass(frozen=True)
+class StaticSolution:
+    """The centre of mass and how well it is known.
+
+    ``status``: ``"determined"``; ``"undetermined"``, the elements of ``undetermined`` are
+    open; ``"ambiguous"``, ``alternatives`` fit as well; ``"slack"``, a cable would have to push;
+    ``"inconsistent"``, readings and description do not agree within their noise;
+    ``"no_pose"``, no pose has these inclinations and lengths (then nothing else is given).
+    """
+
+    status: str
+    statement: str
+    center_of_mass: Array  # (3,) m, body; NaN where undetermined
+    covariance: Array  # (3, 3) m^2; infinite variance where undetermined
+    mass: float  # kg, all but dummies
+    mass_std: float  # kg
+    undetermined: tuple[str, ...] = ()
+    poses: tuple[StaticPose, ...] = ()
+    chi_squared: float = float("nan")
+    degrees_of_freedom: int = 0
+    alternatives: tuple[StaticSolution, ...] = ()
+
+    @property
+    def std(self) -> Array:
+        """(3,) m, one standard deviation of the centre of mass."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+def solve_center_of_mass(rig: Rig, *observations: StaticObservation) -> StaticSolution:
+    """Find the centre of mass (body and carrying frame together) from static observations.
+
+    The first is usually bare and the second carries a dummy; one alone or more are taken
+    too. Tensions count where they are measured. Without ``rig.mass`` the mass is found as
+    well if tensions tell it; a missing ``rig.mass_std`` means an exact mass. No initial guess
+    is needed. Raises ``InputError`` only for no observation at all.
+    """
+    if not observations:
+        raise InputError("static solution: no observation given; pass the bare recording at least")
+    model = StaticModel(rig, observations)
+    candidates = [_candidates(model, observation) for observation in observations]
+    for observation, found in zip(observations, candidates, strict=True):
+        if not found:
+            return _nothing(f"{observation.name}: no pose has these inclinations and cable lengths.")
+    solved = [_solve(model, chosen) for chosen in product(*candidates)]
+    order = sorted(solved, key=lambda s: (s.status == "slack", s.chi_squared))
+    best = order[0]
+    rivals = tuple(other for other in order[1:] if _is_rival(best, other))
+    return _ambiguous(best, rivals) if rivals else best
+
+
+def _is_rival(best: StaticSolution, other: StaticSolution) -> bool:
+    """Whether another solution fits as well and differs in an element that both determine."""
+    if best.status not in FITS or other.status not in FITS or other.chi_squared > best.chi_squared + RIVAL:
+        return False
+    apart = np.abs(other.center_of_mass - best.center_of_mass)
+    return bool(np.any(apart > 3.0 * np.hypot(best.std, other.std) + 1e-6))
+
+
+def without_frame(solution: StaticSolution, frame: CarryingFrame) -> tuple[float, Array, Array]:
+    """Mass (kg), centre of mass (3,) m and its covariance without the carrying frame, taken as exact."""
+    mass = solution.mass - frame.mass
+    center = (solution.mass * solution.center_of_mass - frame.mass * frame.center_of_mass) / mass
+    by_mass = (solution.center_of_mass - center) / mass
+    covariance = (solution.mass / mass) ** 2 * solution.covariance
+    return mass, center, covariance + solution.mass_std**2 * np.outer(by_mass, by_mass)
+
+
+def _candidates(model: StaticModel, observation: StaticObservation) -> list[HangingPose]:
+    """Poses to start from, those in which every cable pulls before the others, four at most."""
+    measured = np.all(np.isfinite(observation.inclination))
+    angles = observation.inclination if measured else np.zeros(2)
+    tolerance = model.rig.tolerance
+    span = float(np.ptp(model.nominal.body, axis=0).max())
+    noise = float(np.max(observation.inclination_std)) if measured else 0.1
+    doubt = tolerance["cable_length"] + 2.0 * tolerance["hinge_position"]
+    doubt += span * (noise + tolerance["inclinometer_orientation"] + tolerance["level"])
+    up = up_in_body(angles, mount(model.rig))
+    poses = poses_with_known_inclination(model.nominal, up, 1e-6 + 10.0 * doubt)
+    taut = [pose for pose in poses if pose.taut]
+    if taut:
+        return sorted(taut, key=lambda pose: pose.misfit)[:4]
+    # Nearly parallel or redundant cables: what little noise there is decides the tensions that
+    # balance exactly, so start from the heading that an evenly loaded body takes as well.
+    middle = model.nominal.body.mean(axis=0)
+    even = [pose for pose in poses_with_known_mass(model.nominal, middle) if pose.taut and pose.stable]
+    pulling = [pose for pose in poses if np.sum(pose.tension) > 0.0]
+    return even[:1] + sorted(pulling, key=lambda pose: pose.misfit)[:1]
+
+
+def _solve(model: StaticModel, chosen: tuple[HangingPose, ...]) -> StaticSolution:
+    # Metres, radians and weights: a belief may move by any number of its tolerances.
+    longest = np.where(np.arange(model.size) < model.first_belief, 0.3, np.inf)
+    adjusted = adjust(_start(model, chosen), model.residuals, model.constraints, model.move, longest)
+    open_rows = np.linalg.norm(adjusted.open_directions, axis=1)
+    size = float(np.ptp(model.nominal.body, axis=0).max())
+    center_covariance = adjusted.covariance[:3, :3] + _open_part(adjusted.open_directions[:3], size)
+    unknown = np.sqrt(np.diag(center_covariance)) > VAGUE * size
+    center = np.where(unknown, np.nan, adjusted.state.center_of_mass)
+    center_covariance[unknown, :] = center_covariance[:, unknown] = 0.0
+    center_covariance[unknown, unknown] = np.inf
+    names = tuple(name for name, lost in zip(AXES, unknown, strict=True) if lost)
+    poses = tuple(_pose(model, adjusted, open_rows, k) for k in range(len(chosen)))
+    status, statement = _judge(model, adjusted, poses, names)
+    mass_known = open_rows[3] < 1e-6
+    return StaticSolution(
+        status=status,
+        statement=statement,
+        center_of_mass=center,
+        covariance=center_covariance,
+        mass=adjusted.state.mass if mass_known else float("nan"),
+        mass_std=adjusted.state.mass * float(np.sqrt(adjusted.covariance[3, 3]))
+        if mass_known
+        else float("inf"),
+        undetermined=names + (() if mass_known else ("m",)),
+        poses=poses,
+        chi_squared=adjusted.chi_squared,
+        degrees_of_freedom=adjusted.degrees_of_freedom,
+    )
+
+
+def _open_part(directions: Array, size: float) -> Array:
+    """(3, 3) m^2: along a direction that nothing determines the centre lies within the hinges' span.
+
+    One hanging leaves only a near-vertical line open; the horizontal elements are still known
+    to the line's slope times its length.
+    """
+    axes, sizes, _ = np.linalg.svd(directions)
+    open_axes = axes[:, : len(sizes)][:, sizes > 1e-6]
+    return np.asarray(size**2 * open_axes @ open_axes.T)
+
+
+def _start(model: StaticModel, chosen: tuple[HangingPose, ...]) -> StaticState:
+    """Poses and tensions of the search; the centre from the moments, linear in it, least squares."""
+    mass = model.rig.mass or _mass_from_tensions(model) or 1000.0
+    middle = model.nominal.body.mean(axis=0)
+    rows, sides, tensions = [], [], []
+    for pose, observation in zip(chosen, model.observations, strict=True):
+        total, arm = hanging_mass(mass, middle, observation.dummy)
+        tension = _first_tension(model, observation, pose, total)
+        tensions.append(tension)
+        at = balance(model.nominal, arm, pose.position, pose.attitude, tension)
+        rows.append((skew(np.array([0.0, 0.0, 1.0])) @ pose.attitude)[:2] * (mass / total))
+        sides.append(-at.residual[-3:-1])
+    step = np.linalg.lstsq(np.vstack(rows), np.concatenate(sides), rcond=1e-4)[0]
+    return StaticState(
+        center_of_mass=middle + step,
+        mass=mass,
+        position=np.array([pose.position for pose in chosen]),
+        attitude=np.array([pose.attitude for pose in chosen]),
+        tension=np.array(tensions),
+        beliefs=np.zeros(len(model.tolerance)),
+    )
+
+
+def _first_tension(model: StaticModel, seen: StaticObservation, pose: HangingPose, total: float) -> Array:
+    """(n,) weights: measured where they are, else balanced, else shared evenly."""
+    if np.all(np.isfinite(seen.tension)):
+        return np.asarray(seen.tension / (total * model.rig.gravity))
+    return pose.tension if pose.taut else np.full(model.cables, 1.0 / model.cables)
+
+
+def _mass_from_tensions(model: StaticModel) -> float | None:
+    for observation in model.observations:
+        if np.all(np.isfinite(observation.tension)):
+            extra = 0.0 if observation.dummy is None else observation.dummy.mass
+            return max(float(np.sum(observation.tension)) / model.rig.gravity - extra, 1e-3)
+    return None
+
+
+def _pose(model: StaticModel, adjusted: Adjusted[StaticState], open_rows: Array, k: int) -> StaticPose:
+    state, columns = adjusted.state, model.tension_columns(k)
+    extra = 0.0 if model.observations[k].dummy is None else model.observations[k].dummy.mass  # type: ignore[union-attr]
+    weight = (state.mass + extra) * model.rig.gravity
+    at = balance(
+        model.believed(state).suspension, np.zeros(3), state.position[k], state.attitude[k], state.tension[k]
+    )
+    std = weight * np.sqrt(np.diag(adjusted.covariance)[columns])
+    return StaticPose(
+        name=model.observations[k].name,
+        position=state.position[k],
+        orientation=Rotation.from_matrix(state.attitude[k]).as_quat(),
+        tension=weight * state.tension[k],
+        tension_std=np.where(open_rows[columns] > 1e-6, np.inf, std),
+        undetermined_tensions=undetermined_tensions(at, model.cables),
+    )
+
+
+def _judge(
+    model: StaticModel,
+    adjusted: Adjusted[StaticState],
+    poses: tuple[StaticPose, ...],
+    unknown: tuple[str, ...],
+) -> tuple[str, str]:
+    cables = [cable.name for cable in model.rig.cables]
+    chance = 1.0
+    if adjusted.degrees_of_freedom > 0:
+        chance = float(chi2.sf(adjusted.chi_squared, adjusted.degrees_of_freedom))
+    if adjusted.constraint_error > 1e-7:
+        return "inconsistent", "The cables cannot be brought to balance with these readings."
+    if chance < IMPROBABLE:
+        settled = "" if adjusted.converged else " (the adjustment did not settle)"
+        return "inconsistent", (
+            f"Readings and rig description do not agree: chi squared {adjusted.chi_squared:.3g} "
+            f"with {adjusted.degrees_of_freedom} degrees of freedom{settled}."
+        )
+    for pose in poses:
+        pushing = [
+            name for name, t, s in zip(cables, pose.tension, pose.tension_std, strict=True) if t < -3.0 * s
+        ]
+        if pushing:
+            return "slack", f"{pose.name}: {', '.join(pushing)} would have to push; it must hang slack."
+    if unknown:
+        redundant = max(pose.undetermined_tensions for pose in poses)
+        why = f"; {redundant} combination(s) of tensions stay open without load cells" if redundant else ""
+        return "undetermined", f"The recordings do not determine {', '.join(unknown)}{why}."
+    if not _stable(model, adjusted.state):
+        return "slack", "The pose found is balanced but would not stay: it is no equilibrium that hangs."
+    return "determined", "The centre of mass is determined."
+
+
+def _stable(model: StaticModel, state: StaticState) -> bool:
+    suspension = model.believed(state).suspension
+    for k, observation in enumerate(model.observations):
+        _, arm = hanging_mass(state.mass, state.center_of_mass, observation.dummy)
+        at = balance(suspension, arm, state.position[k], state.attitude[k], state.tension[k])
+        if not is_stable(at, model.cables):
+            return False
+    return True
+
+
+def _ambiguous(best: StaticSolution, rivals: tuple[StaticSolution, ...]) -> StaticSolution:
+    fields = {name: getattr(best, name) for name in best.__dataclass_fields__}
+    fields |= {
+        "status": "ambiguous",
+        "statement": f"{1 + len(rivals)} solutions fit the readings; a measured tension may decide.",
+        "alternatives": rivals,
+    }
+    return StaticSolution(**fields)
+
+
+def _nothing(statement: str) -> StaticSolution:
+    unknown = np.full(3, np.nan)
+    return StaticSolution(
+        "no_pose", statement, unknown, np.diag(np.full(3, np.inf)), float("nan"), float("inf"), (*AXES, "m")
+    )
