@@ -51,20 +51,18 @@ def select_stamps(stamp_ns: Stamps, received_ns: Stamps) -> StampSelection:
     if far := int(np.count_nonzero(~near)):
         notes.append(f"{far} stamps lie far from the others: left out")
     stamps, received = stamp_ns[chosen], received_ns[chosen]
-    rising = bool(np.all(np.diff(stamps) > 0))
-    unique = np.arange(len(stamps)) if rising else np.sort(np.unique(stamps, return_index=True)[1])
-    duplicated = len(chosen) - len(unique)
-    chosen, stamps, received = chosen[unique], stamps[unique], received[unique]
     pieces = _pieces(stamps, received)
     main = _kept_pieces(pieces, stamps, received)
-    if len(main) < len(pieces) and (lost := _restart(pieces, main)):
+    if lost := _restart(pieces, main):
         notes.append(f"the clock jumped: {lost} messages on another clock are left out")
-    ordered = [_ordered(stamps, start, end) for start, end in main]
-    kept = np.concatenate(ordered) if ordered else np.zeros(0, np.int64)
-    in_order = sum(len(_increasing(stamps, start, end)) for start, end in main)
-    if restored := len(kept) - in_order:
-        notes.append(f"{restored} messages came late and were put back in their place")
-    return StampSelection(chosen[kept], duplicated, len(stamps) - in_order, tuple(notes))
+    runs = [_increasing(stamps, *piece) for piece in main]
+    ordered = [_with_late(stamps, run, *piece) for run, piece in zip(runs, main, strict=True)]
+    kept = np.concatenate([np.zeros(0, np.int64), *ordered])
+    if late := len(kept) - sum(map(len, runs)):
+        notes.append(f"{late} messages came late and were put back in their place")
+    duplicated = sum(_repeated(stamps, kept, *piece) for piece in main)
+    backward = len(stamps) - len(kept) - duplicated + late
+    return StampSelection(chosen[kept], duplicated, backward, tuple(notes))
 
 
 def _median_interval(stamps: Stamps) -> float:
@@ -90,12 +88,12 @@ def _receive_usable(stamps: Stamps, received: Stamps) -> bool:
 
 
 def _pieces(stamps: Stamps, received: Stamps) -> list[tuple[int, int]]:
-    """Ranges of messages between jumps of the clock."""
+    """Ranges of messages between long steps of the stamps; a gap makes two pieces that both stay."""
     if not len(stamps):
         return []
     steps = np.diff(stamps)
     interval = _median_interval(stamps)
-    jump = steps < -max(20.0 * interval, 0.1 * _SECOND)
+    jump = np.abs(steps) > max(20.0 * interval, 0.1 * _SECOND)
     if _receive_usable(stamps, received):
         jump |= np.abs(steps - np.diff(received)) > np.maximum(_RECEIVE_JITTER, 0.5 * np.abs(steps))
     cuts = [0, *(np.flatnonzero(jump) + 1).tolist(), len(stamps)]
@@ -108,11 +106,13 @@ def _kept_pieces(pieces: list[tuple[int, int]], stamps: Stamps, received: Stamps
         return pieces
     bounds = {piece: (int(stamps[slice(*piece)].min()), int(stamps[slice(*piece)].max())) for piece in pieces}
     offset = {piece: float(np.median(stamps[slice(*piece)] - received[slice(*piece)])) for piece in pieces}
-    by_length = sorted(pieces, key=lambda piece: piece[0] - piece[1])
-    longest = by_length[0]
+    longest = min(pieces, key=lambda piece: piece[0] - piece[1])
+    by_length = sorted(pieces, key=lambda piece: (piece[0] - piece[1], abs(offset[piece] - offset[longest])))
     compare_clocks = _receive_usable(stamps[slice(*longest)], received[slice(*longest)])
     kept = [longest]
-    for piece in by_length[1:]:
+    for piece in by_length:
+        if piece == longest:
+            continue
         place = bisect_left(kept, piece)
         after_previous = place == 0 or bounds[kept[place - 1]][1] < bounds[piece][0]
         before_next = place == len(kept) or bounds[piece][1] < bounds[kept[place]][0]
@@ -139,6 +139,8 @@ def _increasing(stamps: Stamps, start: int, end: int) -> Indices:
         if place == len(tails):
             tails.append(stamp)
             tail_indices.append(index)
+        elif tails[place] == stamp:
+            continue  # of equal stamps the first stays
         else:
             tails[place], tail_indices[place] = stamp, index
         before[index] = tail_indices[place - 1] if place else -1
@@ -149,18 +151,26 @@ def _increasing(stamps: Stamps, start: int, end: int) -> Indices:
     return start + chain
 
 
-def _ordered(stamps: Stamps, start: int, end: int) -> Indices:
+def _with_late(stamps: Stamps, run: Indices, start: int, end: int) -> Indices:
     """The increasing run of a piece with late messages put back where there is room."""
-    run = _increasing(stamps, start, end)
     if len(run) == end - start:
         return run
     late = np.setdiff1d(np.arange(start, end), run)
-    room = _ROOM * _median_interval(stamps[run])
+    late = late[np.sort(np.unique(stamps[late], return_index=True)[1])]
+    room = _ROOM * _median_interval(np.sort(stamps[start:end]))
     following = np.searchsorted(stamps[run], stamps[late])
-    far_left = np.where(following > 0, stamps[late] - stamps[run[following - 1]], np.inf)
-    far_right = np.where(
-        following < len(run), stamps[run[np.minimum(following, len(run) - 1)]] - stamps[late], np.inf
-    )
-    fitting = late[(far_left > room) & (far_right > room)]
-    merged = np.concatenate((run, fitting))
+    left = stamps[run[np.maximum(following - 1, 0)]]
+    right = stamps[run[np.minimum(following, len(run) - 1)]]
+    far_left = (following == 0) | (stamps[late] - left > room)
+    far_right = (following == len(run)) | (right - stamps[late] > room)
+    merged = np.concatenate((run, late[far_left & far_right]))
     return merged[np.argsort(stamps[merged], kind="stable")]
+
+
+def _repeated(stamps: Stamps, kept: Indices, start: int, end: int) -> int:
+    """Messages of a piece left out because another with the same stamp stays."""
+    inside = kept[(kept >= start) & (kept < end)]
+    if len(inside) == end - start:
+        return 0
+    left_out = np.setdiff1d(np.arange(start, end), inside)
+    return int(np.count_nonzero(np.isin(stamps[left_out], stamps[inside])))
