@@ -90,7 +90,8 @@ def test_stamps_that_run_backwards(tmp_path: Path, back: float) -> None:
 
 @pytest.mark.parametrize("ahead", [0.013, 0.3, 1.7, 30.0])
 def test_single_stamps_ahead_do_not_cost_what_follows(tmp_path: Path, ahead: float) -> None:
-    wrong = {100, 450, 599}
+    # A little ahead of the very last stamp is what overtaking looks like.
+    wrong = {100, 450, 580 if ahead < 0.1 else 599}
 
     def edit(topic: str, index: int, message: Any) -> Any:
         return shift_stamp(message, int(ahead * SECOND)) if topic == IMU and index in wrong else message
