@@ -161,6 +161,7 @@ SESSION_FAULTS = [
     (first(bag=None), r"recordings\[0\].bag: missing"),
     (first(bag=7), r"recordings\[0\].bag: 7 is not a path"),
     (first(bag="nowhere"), "nowhere: bag does not exist"),
+    (first(bag="static_1/static_1.mcap"), "static_1.mcap: is a file; give the bag's folder"),
     (first(bag="./dynamic_2"), r"recordings\[1\].bag: dynamic_2 is listed twice"),
     (first(kind=None), r"recordings\[0\].kind: missing"),
     (first(kind="still"), r"recordings\[0\].kind: 'still' is unknown; give static or dynamic"),

@@ -247,6 +247,15 @@ def test_a_device_that_the_description_does_not_know(tmp_path: Path, device: str
     assert notes == [f"the rig description has no {device}: left aside"]
 
 
+def test_a_device_that_is_switched_off(tmp_path: Path) -> None:
+    written = make_recording()
+    off = Series(written.tension["cable_1"].time, np.zeros_like(written.tension["cable_1"].values))
+    recording = dataclasses.replace(written, tension={**written.tension, "cable_1": off})
+    read = read_session(write_single(recording, tmp_path / "out")).recordings[0]
+    assert_subset(read.tension["cable_1"], off, set())
+    assert "never change" in account(read, CABLE).notes[0]
+
+
 def test_mocap_without_orientation(tmp_path: Path) -> None:
     written = make_recording()
     assert written.mocap is not None

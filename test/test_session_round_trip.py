@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2.storage_mcap import McapWriter
-from session_samples import CABLES, START_NS, make_recording, make_session, rewrite, write_single
+from session_samples import CABLES, START_NS, edit_yaml, make_recording, make_session, rewrite, write_single
 
 from rig_identification.errors import InputError
-from rig_identification.recording import Recording, Session
+from rig_identification.recording import Recording, Series, Session
 from rig_identification.session import read_session, write_session
 
 CHANNELS = ("exciter_force", "exciter_shaft", "imu", "inclination", "mocap", "ground_truth")
@@ -117,6 +117,43 @@ def test_a_long_message_of_another_topic_among_ours(session: Session, tmp_path: 
         database.execute("INSERT INTO messages VALUES(50000, 99, 5, zeroblob(100000))")
     database.close()
     assert_same(read_session(folder), session)
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_bag_split_into_files(tmp_path: Path, storage: str) -> None:
+    whole = make_recording(seconds=3.0, seed=6)
+    folder = write_single(whole, tmp_path / "out", storage=storage)
+    halves = [write_single(half, tmp_path / half.name, storage=storage) for half in halved(whole)]
+    bag = folder / whole.name
+    next(path for path in bag.iterdir() if path.name != "metadata.yaml").unlink()
+    for half in halves:
+        (file,) = (path for path in (half / half.name).iterdir() if path.name != "metadata.yaml")
+        file.rename(bag / file.name)
+    names = sorted(path.name for path in bag.iterdir() if path.name != "metadata.yaml")
+
+    def edit(document: dict[str, dict[str, object]]) -> None:
+        document["rosbag2_bagfile_information"]["relative_file_paths"] = names
+
+    edit_yaml(bag / "metadata.yaml", edit)
+    assert_same_numbers(read_session(folder).recordings[0], whole)
+
+
+def halved(whole: Recording) -> list[Recording]:
+    """The samples before and from 1.5 s on."""
+
+    def part(series: Series, late: bool) -> Series:
+        chosen = (series.time >= 1.5) == late
+        return Series(series.time[chosen], series.values[chosen])
+
+    return [
+        dataclasses.replace(
+            whole,
+            name=f"half_{int(late)}",
+            tension={cable: part(series, late) for cable, series in whole.tension.items()},
+            **{channel: part(getattr(whole, channel), late) for channel in CHANNELS},
+        )
+        for late in (False, True)
+    ]
 
 
 def test_layouts_that_vary_within_a_topic(tmp_path: Path) -> None:

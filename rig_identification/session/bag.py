@@ -51,6 +51,8 @@ def read_bag(folder: Path, wanted: Collection[str]) -> Bag:
     InputError
         No such folder, no metadata.yaml, a damaged or truncated bag, or one topic with two types.
     """
+    if folder.is_file():
+        raise InputError(f"{folder}: is a file; give the bag's folder, which holds metadata.yaml too")
     if not folder.is_dir():
         raise InputError(f"{folder}: bag does not exist; correct its path in session.yaml or copy it there")
     if not (folder / "metadata.yaml").is_file():

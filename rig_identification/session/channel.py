@@ -31,6 +31,8 @@ _CAN_CLIP = ("tension", "exciter_force", "imu", "inclination")
 #: Channels that carry a quaternion in columns 3 to 6.
 _POSES = ("mocap", "ground_truth")
 _GAP = 1.5  # median intervals
+#: Samples after which a value that never changes is worth a note.
+_STUCK = 50
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,8 @@ def _clean(
     finite = np.isfinite(values).all(axis=1)
     if not finite.any():
         notes = ("never a number in every field: taken as not measured",)
+    elif topic.channel in _CAN_CLIP and len(values) >= _STUCK and not np.ptp(values[finite], axis=0).any():
+        notes = ("the values never change: the device may be stuck or switched off",)
     clipped = np.zeros(len(values), bool)
     if topic.channel in _CAN_CLIP:
         clipped[finite] = clipped_samples(values[finite])

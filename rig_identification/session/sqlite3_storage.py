@@ -182,9 +182,12 @@ def _rows(pages: Bytes) -> Rows:
         raise UnknownLayout("a row of other types")
     topic_id, data_at = _integer(buffer, at + header, kinds[1])
     received, data_at = _integer(buffer, data_at, kinds[2])
+    ends = data_at + (kinds[3] - 12) // 2
     if np.any(payload > size - 35):
         raise UnknownLayout("a message on several pages")
-    return Rows(topic_id, received, buffer, data_at, data_at + (kinds[3] - 12) // 2)
+    if np.any(ends != at + payload):
+        raise UnknownLayout("a row that does not end where it says")
+    return Rows(topic_id, received, buffer, data_at, ends)
 
 
 def _big_endian(pairs: Bytes) -> Integers:
