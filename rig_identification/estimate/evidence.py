@@ -69,20 +69,29 @@ class Run:
 
     def until(self, end: float) -> Run:
         """The same run, cut off at ``end`` seconds."""
-        nodes = min(self.grid.nodes, max(8, int(round(end / self.grid.step)) + 1))
-        grid = replace(self.grid, nodes=nodes)
+        return self.between(0, int(round(end / self.grid.step)), margin=MARGIN)
+
+    def between(self, first: int, last: int, margin: float = 0.0) -> Run:
+        """Nodes ``first`` to ``last`` as a run of their own; its time starts at node ``first``."""
+        last = min(self.grid.nodes - 1, max(first + 7, last))
+        grid = replace(self.grid, nodes=last - first + 1)
+        shift = first * self.grid.step
         cut = []
         for channel in self.channels:
-            inside = channel.time <= grid.duration - MARGIN
-            if np.count_nonzero(inside) < 5:
+            time = channel.time - shift
+            inside = (time >= 0.0) & (time <= grid.duration - margin)
+            if not np.any(inside):
                 continue
-            group, node = group_by_node(grid, channel.time[inside])
+            group, node = group_by_node(grid, time[inside])
             cut.append(
-                replace(
-                    channel, time=channel.time[inside], values=channel.values[inside], group=group, node=node
-                )
+                replace(channel, time=time[inside], values=channel.values[inside], group=group, node=node)
             )
-        return replace(self, grid=grid, channels=tuple(cut))
+        exciter = self.exciter
+        if exciter is not None:
+            # Two extra intervals on either side, so that the input's spline feels no edge
+            near = (exciter.time >= shift - 2 * grid.step) & (exciter.time <= shift + grid.duration + 2 * grid.step)
+            exciter = Series(exciter.time[near] - shift, exciter.values[near]) if np.any(near) else None
+        return replace(self, grid=grid, channels=tuple(cut), exciter=exciter)
 
 
 def _noise(rig: Rig, name: str, values: Array) -> tuple[Array, bool]:

@@ -99,6 +99,12 @@ class Linearised:
     nodes: NDArray[np.int64]  # (m,) node of each row
     channel: NDArray[np.int64]  # (m,) index into run.channels
     axis: NDArray[np.int64]  # (m,) column within the channel
+    plain: Array  # (m,) residual before whitening, in the channel's unit
+    variance: Array  # (m,) sensor noise of each row
+    row_H: Array  # (m, 12) response of each row to the state at its node
+    row_D: Array  # (m, 6) ... and to the wrench
+    Q: Array  # (N, 6, 6) covariance of the wrench that noise stands for
+    readings: dict[str, sensors.Reading]  # each device at the nodes
 
     @property
     def cost(self) -> float:
@@ -159,16 +165,19 @@ def _channel_rows(
     return residual, np.concatenate([jacobian, own_columns], axis=2), H, D
 
 
-def linearise_run(bench: Bench, run: Run, theta: Array, start: State) -> Linearised | None:
+def linearise_run(
+    bench: Bench, run: Run, theta: Array, start: State, *, start_only: bool = False, extra_noise: Array | None = None
+) -> Linearised | None:
     """Whitened residual and Jacobian of one run; None where the motion leaves every bound.
 
     Jacobian columns: the vector of ``bench.parameters``, then the start coordinates of
-    :func:`start_basis`.
+    :func:`start_basis`. ``start_only`` leaves the parameters' columns at zero and saves their cost.
+    ``extra_noise`` (6, 6): covariance of a further random wrench held over each node interval.
     """
     parameters = bench.parameters
     model = model_at(parameters, theta)
     basis = start_basis(model, start)
-    directions = parameters.directions()
+    directions = np.zeros(0, dtype=np.int64) if start_only else parameters.directions()
     motion = simulate(
         model,
         start,
@@ -180,7 +189,7 @@ def linearise_run(bench: Bench, run: Run, theta: Array, start: State) -> Lineari
     if not motion.complete:
         return None
     own = parameters.device(theta)
-    in_physics = parameters.physics_jacobian(theta)
+    in_physics = parameters.physics_jacobian(theta)[: directions.size]
     starts = basis.shape[1]
     width = parameters.size + starts
     stacked: list[tuple[Array, ...]] = []
@@ -214,11 +223,28 @@ def linearise_run(bench: Bench, run: Run, theta: Array, start: State) -> Lineari
     node, which, axis, H, D, variance, columns = (
         np.ascontiguousarray(part[order]) for part in (node, which, axis, H, D, variance, columns)
     )
+    plain = columns[:, 0].copy()
     Q = force_noise(run, parameters, theta)
+    if extra_noise is not None:
+        Q = Q + extra_noise
     if np.any(Q):
         log_spread = float(whiten(motion.A, motion.B, Q, node, H, D, variance, columns))
     else:
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
         log_spread = float(np.sum(np.log(deviation)))
-    return Linearised(columns[:, 0], columns[:, 1:], log_spread, motion, node, which, axis)
+    return Linearised(
+        columns[:, 0],
+        columns[:, 1:],
+        log_spread,
+        motion,
+        node,
+        which,
+        axis,
+        plain,
+        variance,
+        H,
+        D,
+        Q,
+        readings,
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,19 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
     if recording.inclination is not None and rig.inclinometer is not None:
         add("inclinometer", "inclination", "rad", "inclination", recording.inclination.values, slice(0, 2))
     return RestEvidence(recording, recording.dummy, tuple(channels))
+
+
+#: What a first guess believes of a rig: cells to 0.3 %, angles to 1 mrad, accelerometers to 0.03 m/s^2.
+COARSE = {"tension": 0.003, "inclination": 1e-3, "specific_force": 0.03, "angular_rate": 1e-3}
+
+
+def coarsened(evidence: RestEvidence) -> RestEvidence:
+    """The same means with the variance of a rig that is only roughly as described: for a first guess."""
+    channels = []
+    for c in evidence.channels:
+        spread = COARSE[c.quantity] * (np.abs(c.mean) if c.quantity == "tension" else 1.0)
+        channels.append(replace(c, variance=c.variance + spread**2))
+    return replace(evidence, channels=tuple(channels))
 
 
 def with_dummy(model: RigModel, dummy: Dummy | None) -> RigModel:

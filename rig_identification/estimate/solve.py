@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import Bench, Linearised, linearise_run, model_at, start_basis
+from rig_identification.estimate.prediction import START_UNIT, Bench, Linearised, linearise_run, model_at, start_basis
 from rig_identification.estimate.rest_evidence import (
     RestEvidence,
     RestLinearised,
@@ -39,6 +39,7 @@ class Problem:
     mass: tuple[float, float] | None  # ground scale: value and std, kg
     weak: Array  # (10,) std of a weak prior on the log-Cholesky vector about ``weak_center``
     weak_center: Array  # (10,)
+    bound: float = np.inf  # free parameters stay within so many of their prior std
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,36 @@ def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
     return Point(theta, tuple(starts), guesses)
 
 
-#: A step is believed while no entry of the log-Cholesky vector and no prior unit moves further.
+def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Array:
+    """Damped Gauss-Newton step that keeps the free parameters within their bound.
+
+    Active set: a parameter that the step would carry past its bound goes onto it, and the
+    others are solved for again with that move made (Nocedal & Wright, "Numerical
+    Optimization", section 16.7). No log-Cholesky entry moves by more than LONGEST_STEP.
+    """
+    p = problem.bench.parameters.size
+    information = current.information + damping * np.diag(np.diag(current.information))
+    fixed = np.zeros(information.shape[0], dtype=bool)
+    change = np.zeros(information.shape[0])
+    theta = current.point.theta
+    for _ in range(20):
+        open_ = np.flatnonzero(~fixed)
+        held = np.flatnonzero(fixed)
+        right = current.gradient[open_] - information[np.ix_(open_, held)] @ change[held]
+        change[open_] = np.linalg.solve(information[np.ix_(open_, open_)], right)
+        reached = np.zeros_like(fixed)
+        target = theta[INERTIAL:p] + change[INERTIAL:p]
+        reached[INERTIAL:p] = (np.abs(target) > problem.bound + 1e-9) & ~fixed[INERTIAL:p]
+        if not np.any(reached):
+            break
+        beyond = np.flatnonzero(reached)
+        change[beyond] = np.sign(theta[beyond] + change[beyond]) * problem.bound - theta[beyond]
+        fixed |= reached
+    longest = float(np.max(np.abs(change[:INERTIAL])))
+    return change * min(1.0, LONGEST_STEP / max(longest, 1e-300))
+
+
+#: No entry of the log-Cholesky vector moves further than this in one step (logarithms, m).
 LONGEST_STEP = 1.0
 
 
@@ -167,10 +197,8 @@ def solve(
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
     damping = 1e-6
     for iteration in range(iterations):
-        diagonal = np.diag(current.information)
         while True:
-            damped = current.information + damping * np.diag(diagonal)
-            change = np.linalg.solve(damped, current.gradient)
+            change = _bounded_step(problem, current, damping)
             gain = 0.5 * float(change @ current.gradient)
             if gain < tolerance and damping <= 1e-3:
                 return current, True
@@ -185,6 +213,55 @@ def solve(
         if notify is not None:
             notify(iteration, current.cost)
     return current, False
+
+
+def fit_start(
+    bench: Bench,
+    run: Run,
+    theta: Array,
+    start: State,
+    *,
+    iterations: int = 20,
+    tolerance: float = 1e-3,
+    extra_noise: Array | None = None,
+    spread: float = np.inf,
+) -> tuple[Linearised, State] | None:
+    """The run's own start state alone, everything else held: what a held-out run may be given.
+
+    extra_noise (6, 6): see :func:`linearise_run`. spread: std of a prior on the start about
+    ``start`` (m, rad; twice as much m/s, rad/s).
+    """
+    p = bench.parameters.size
+    model = model_at(bench.parameters, theta)
+
+    def attempt(state: State) -> Linearised | None:
+        return linearise_run(bench, run, theta, state, start_only=True, extra_noise=extra_noise)
+
+    current = attempt(start)
+    if current is None:
+        return None
+    damping, moved_so_far = 1e-9, np.zeros(current.jacobian.shape[1] - p)
+    dof = moved_so_far.size // 2
+    weight = (START_UNIT / spread / np.repeat([1.0, 2.0], dof)) ** 2
+    for _ in range(iterations):
+        columns = current.jacobian[:, p:]
+        information = columns.T @ columns + np.diag(weight)
+        gradient = columns.T @ current.residual - weight * moved_so_far
+        damped = information + damping * np.diag(np.diag(information))
+        change = np.linalg.lstsq(damped, gradient, rcond=1e-12)[0]
+        if 0.5 * float(change @ gradient) < tolerance:
+            break
+        moved = on_cables(model, start.moved(start_basis(model, start) @ change))
+        trial = attempt(moved)
+        further = moved_so_far + change
+        prior_change = 0.5 * float(weight @ (further**2 - moved_so_far**2))
+        if trial is not None and trial.cost + prior_change < current.cost + 1e-9 * abs(current.cost):
+            current, start, moved_so_far, damping = trial, moved, further, max(damping * 0.1, 1e-12)
+        else:
+            damping = max(damping, 1e-6) * 10.0
+            if damping > 1e6:
+                break
+    return current, start
 
 
 def shortened(problem: Problem, end: float) -> Problem:

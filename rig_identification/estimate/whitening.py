@@ -87,3 +87,80 @@ def whiten(A, B, Q, node, H, D, variance, columns):  # type: ignore[no-untyped-d
             for j in range(12):
                 P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
     return log_sum
+
+
+@njit(cache=True, nogil=True)
+def smooth(A, B, Q, node, H, D, variance, residual, start):  # type: ignore[no-untyped-def]
+    """Best correction of the nominal motion by noise that enters as force, given the whole run.
+
+    Arguments as in :func:`whiten`; residual (m,) measured less predicted; start (12, 12)
+    covariance of the start state. Returns (N, 12) state and (N, 6) wrench corrections, and
+    (N, 12, 12) covariance of the filtered state (fixed-interval smoother by the adjoint
+    recursion, which inverts no covariance: Durbin & Koopman, "Time Series Analysis by
+    State Space Methods", 2012, section 4.4).
+    """
+    rows = residual.shape[0]
+    nodes = A.shape[0]
+    size = 18
+    means = np.zeros((nodes, size))
+    spreads = np.zeros((nodes, size, size))
+    gains = np.zeros((rows, size))
+    scaled = np.zeros(rows)
+    filtered = np.zeros((nodes, 12, 12))
+    P = np.zeros((size, size))
+    P[:12, :12] = start
+    x = np.zeros(size)
+    h = np.empty(size)
+    F = np.empty((12, size))
+    row = 0
+    for k in range(nodes):
+        for i in range(6):
+            x[12 + i] = 0.0
+            for j in range(6):
+                P[12 + i, 12 + j] = Q[k, i, j]
+            for j in range(12):
+                P[12 + i, j] = 0.0
+                P[j, 12 + i] = 0.0
+        means[k] = x
+        spreads[k] = P
+        while row < rows and node[row] == k:
+            h[:12] = H[row]
+            h[12:] = D[row]
+            Ph = np.dot(P, h)
+            spread = variance[row] + np.dot(h, Ph)
+            gains[row] = Ph / spread
+            miss = residual[row] - np.dot(h, x)
+            scaled[row] = miss / spread
+            for i in range(size):
+                x[i] += gains[row, i] * miss
+                for j in range(size):
+                    P[i, j] -= gains[row, i] * Ph[j]
+            row += 1
+        filtered[k] = P[:12, :12]
+        F[:, :12] = A[k]
+        F[:, 12:] = B[k]
+        x_next = np.dot(F, x)
+        P_next = np.dot(np.dot(F, P), F.T)
+        x[:12] = x_next
+        for i in range(12):
+            for j in range(12):
+                P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
+    states = np.zeros((nodes, 12))
+    wrenches = np.zeros((nodes, 6))
+    adjoint = np.zeros(size)
+    row = rows - 1
+    for k in range(nodes - 1, -1, -1):
+        if k < nodes - 1:
+            F[:, :12] = A[k]
+            F[:, 12:] = B[k]
+            adjoint = np.dot(F.T, np.ascontiguousarray(adjoint[:12]))
+        while row >= 0 and node[row] == k:
+            h[:12] = H[row]
+            h[12:] = D[row]
+            weight = scaled[row] - np.dot(gains[row], adjoint)
+            adjoint = adjoint + h * weight
+            row -= 1
+        best = means[k] + np.dot(spreads[k], adjoint)
+        states[k] = best[:12]
+        wrenches[k] = best[12:]
+    return states, wrenches, filtered

@@ -1,0 +1,97 @@
+"""Every measured sample beside its prediction, for residuals and pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.prediction import Linearised
+from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
+from rig_identification.estimate.sampling import interpolation
+from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.whitening import smooth
+from rig_identification.result import ChannelFit
+
+Array = NDArray[np.float64]
+
+
+def node_corrections(linearised: Linearised) -> Array | None:
+    """(N, 18 + n) correction of the raw outputs by the smoothed error of the exciter's force; None without noise."""
+    motion = linearised.motion
+    if not np.any(linearised.Q) or motion.H is None or motion.D is None:
+        return None
+    states, wrenches, _ = smooth(
+        motion.A,
+        motion.B,
+        linearised.Q,
+        linearised.nodes,
+        linearised.row_H,
+        linearised.row_D,
+        linearised.variance,
+        linearised.plain,
+        np.zeros((12, 12)),
+    )
+    return np.asarray(np.einsum("nij,nj->ni", motion.H, states) + np.einsum("nij,nj->ni", motion.D, wrenches))
+
+
+def _clock(problem: Problem, theta: Array, device: str) -> float:
+    entry = problem.bench.parameters.places.clock(device)
+    return 0.0 if entry is None else float(problem.bench.parameters.device(theta)[entry])
+
+
+def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -> list[ChannelFit]:
+    """One :class:`ChannelFit` an axis of each channel of a run, sample by sample."""
+    corrections = node_corrections(linearised)
+    fits = []
+    for channel in run.channels:
+        reading = linearised.readings[channel.device]
+        nodes = reading.values[:, channel.columns]
+        if corrections is not None:
+            nodes = nodes + np.einsum("nij,nj->ni", reading.in_raw[:, channel.columns], corrections)
+        late = _clock(problem, theta, channel.device)
+        each = np.arange(channel.time.size)
+        value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
+        fits += _axes(run.recording.name, channel, np.asarray(value @ nodes))
+    return fits
+
+
+def _axes(recording: str, channel: Channel, predicted: Array) -> list[ChannelFit]:
+    return [
+        ChannelFit(
+            recording,
+            channel.device,
+            channel.quantity,
+            "xyz"[a] if channel.width > 1 else None,
+            channel.unit,
+            float(channel.noise[a]),
+            channel.noise_estimated,
+            channel.time,
+            channel.values[:, a],
+            predicted[:, a],
+        )
+        for a in range(channel.width)
+    ]
+
+
+def rest_fits(evidence: RestEvidence, rest: RestLinearised) -> list[ChannelFit]:
+    """One point a channel and axis of a static recording: its mean, in units of the mean's own std."""
+    fits = []
+    middle = np.array([0.5 * evidence.recording.duration])
+    for channel, predicted in zip(evidence.channels, rest.predicted, strict=True):
+        for a in range(channel.mean.size):
+            fits.append(
+                ChannelFit(
+                    evidence.recording.name,
+                    channel.device,
+                    channel.quantity,
+                    "xyz"[a] if channel.mean.size > 1 else None,
+                    channel.unit,
+                    float(np.sqrt(channel.variance[a])),
+                    False,
+                    middle,
+                    channel.mean[a : a + 1],
+                    predicted[a : a + 1],
+                )
+            )
+    return fits

@@ -1,0 +1,61 @@
+"""Horizons that grow: a fit that converges without a guess.
+
+Sensitivity to the inertia grows with time, and the basin of a fit over a horizon T shrinks
+as 1/T. So the first fraction of a second comes first, and each longer horizon starts from
+the shorter one's result, whose remaining error is already far inside the next basin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.prediction import Bench, Linearised
+from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, shortened, solve
+from rig_identification.model.motion import State
+
+#: First horizon (s) and growth: about a period of such a rig, then fourfold.
+FIRST_HORIZON = 2.0
+GROWTH = 4.0
+
+
+def horizons(duration: float) -> list[float]:
+    """Ends (s) of the growing horizons, the last one the whole run."""
+    ends, end = [], FIRST_HORIZON
+    while end * GROWTH**0.5 < duration:
+        ends.append(end)
+        end *= GROWTH
+    return [*ends, duration]
+
+
+def solve_growing(
+    problem: Problem, point: Point, notify: Callable[[float, str], None] | None = None
+) -> tuple[Evaluation, bool]:
+    """Fit over growing horizons; (evaluation over everything, whether the last one converged)."""
+    duration = max((run.grid.duration for run in problem.runs), default=0.0)
+    ends = horizons(duration) if problem.runs else [0.0]
+    for i, end in enumerate(ends):
+        whole = i == len(ends) - 1
+        part = problem if whole else shortened(problem, end)
+        # A short horizon needs no polish: the next one moves everything again
+        evaluation, converged = solve(
+            part,
+            point,
+            iterations=30 if whole else 8,
+            tolerance=1e-3 if whole else 0.5,
+            notify=None if notify is None else lambda k, cost, e=end: notify(e / max(duration, 1e-9), f"first {e:.1f} s, step {k + 1}"),
+        )
+        point = evaluation.point
+    return evaluation, converged
+
+
+def fit_start_growing(bench: Bench, run: Run, theta, start: State) -> tuple[Linearised, State] | None:  # type: ignore[no-untyped-def]
+    """A held-out run's start state over growing horizons."""
+    result = None
+    for end in horizons(run.grid.duration):
+        whole = end >= run.grid.duration
+        result = fit_start(bench, run if whole else run.until(end), theta, start, tolerance=1e-3 if whole else 0.5)
+        if result is None:
+            return None
+        start = result[1]
+    return result

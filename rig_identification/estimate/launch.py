@@ -1,0 +1,101 @@
+"""From nothing to a first guess: rest, then the motion tracked, then momentum balanced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.first_guess import extent, rest_of
+from rig_identification.estimate.momentum import balance, regress
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.prediction import Bench, model_at
+from rig_identification.estimate.rest_evidence import coarsened
+from rig_identification.estimate.solve import Point, Problem, fit_start, solve
+from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
+from rig_identification.model import layout
+from rig_identification.model.motion import State
+
+Array = NDArray[np.float64]
+
+#: Motion that the regression looks at, s: more adds precision that the fit brings anyway.
+REGRESSED = 12.0
+#: Random wrench of the tracker, as a share of the body's weight.
+SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class Launch:
+    """A guess on its way to being good enough."""
+
+    problem: Problem
+    theta: Array
+    rest: State | None = None
+    starts: tuple[State, ...] = ()
+
+    def from_rest(self) -> Launch:
+        """Centre of mass from the static recordings, where there are any, and the pose at rest."""
+        problem, theta = self.problem, self.theta
+        rest = rest_of(model_at(problem.bench.parameters, theta))
+        if problem.rests:
+            # Rest says little of the height where cables hang straight: hold it near the guess
+            weak = problem.weak.copy()
+            weak[9] *= 0.15
+            roughly = replace(problem, runs=(), rests=tuple(coarsened(r) for r in problem.rests), weak=weak)
+            evaluation, _ = solve(roughly, Point(theta, (), (rest,) * len(problem.rests)), tolerance=1e-2)
+            # Only the body is taken over; doubts about the rig start as described
+            theta = theta.copy()
+            theta[:INERTIAL] = evaluation.point.theta[:INERTIAL]
+            rest = rest_of(model_at(problem.bench.parameters, theta))
+        return replace(self, theta=theta, rest=rest, starts=(rest,) * len(problem.runs))
+
+    def from_momentum(self) -> Launch:
+        """Start states from the tracked motion, and inertia from its momentum where every cable is measured."""
+        if self.rest is None:
+            raise ValueError("from_rest comes first")
+        problem, parameters = self.problem, self.problem.bench.parameters
+        starts, balances = [], []
+        for run in problem.runs:
+            found = tracked(problem.bench, run.until(REGRESSED), self.theta, self.rest)
+            starts.append(self.rest if found is None else found.state(0))
+            both = None if found is None else balance(found, run.until(REGRESSED), parameters, self.theta)
+            if both is not None:
+                balances.append(both)
+        theta = self.theta.copy()
+        if balances:
+            theta[:INERTIAL] = regress(balances, theta[:INERTIAL], problem.weak)
+        return replace(self, theta=theta, starts=tuple(starts))
+
+    def point(self) -> Point:
+        """Where the fit starts."""
+        if self.rest is None:
+            raise ValueError("from_rest comes first")
+        return Point(self.theta, self.starts, (self.rest,) * len(self.problem.rests))
+
+
+def tracked(bench: Bench, run: Run, theta: Array, rest: State) -> Track | None:
+    """A run tracked from a start that may be anywhere near rest."""
+    physics = bench.parameters.physics(theta)
+    size = float(np.max(extent(bench.rig)))
+    noise = wrench_noise(physics[layout.INERTIAL], bench.rig.gravity, size, run.grid.step, SHARE)
+    start = launch_state(bench, run, theta, rest, noise)
+    return track(bench, run, theta, start, start_covariance(0.02, 0.05), noise)
+
+
+#: Horizons (s) over which a start state is found, a random wrench standing for what is not known.
+LAUNCHES = (0.2, 0.5, 1.0)
+
+
+def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array | None = None) -> State:
+    """Start state of a run: within a fifth of the cables' length of rest, by its first second."""
+    length = float(np.mean([cable.length for cable in bench.rig.cables]))
+    start = rest
+    for end in LAUNCHES:
+        found = fit_start(
+            bench, run.until(end), theta, start, tolerance=1e-2, extra_noise=noise, spread=0.2 * length
+        )
+        if found is not None:
+            start = found[1]
+    return start

@@ -1,0 +1,107 @@
+"""Motion of the body from its sensors and the cables' geometry, without trusting its inertia.
+
+An extended Kalman filter on the forward model: a random wrench stands for everything that
+the assumed body gets wrong, and the model is linearised afresh in blocks short enough for
+the error inside a block to stay small. Each block is smoothed. Cable lengths hold exactly
+and gravity is seen by accelerometer and inclinometer, so that nothing drifts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.prediction import Bench, linearise_run, model_at
+from rig_identification.estimate.whitening import smooth
+from rig_identification.model import layout
+from rig_identification.model.motion import State, on_cables
+
+Array = NDArray[np.float64]
+
+#: Length of a block (s): a tenth of the shortest rigid-body period of vehicle rigs.
+BLOCK = 0.1
+
+
+@dataclass(frozen=True)
+class Track:
+    """Smoothed motion at the nodes of a run."""
+
+    time: Array  # (N,) s
+    states: Array  # (N, 12) position and velocity in world, rate in body; rotation entries are zero
+    R_world_body: Array  # (N, 3, 3)
+    covariance: Array  # (N, 12, 12) of the filtered state
+    wrench: Array  # (N, 6) what the assumed body's equations lack, about the datum, body axes
+    outputs: Array  # (N, 18 + n) raw outputs of the forward model, corrected
+
+    def state(self, node: int) -> State:
+        """State at one node."""
+        x = self.states[node]
+        return State(x[:3], self.R_world_body[node], x[6:9], x[9:12])
+
+
+def wrench_noise(mass: float, gravity: float, size: float, step: float, share: float) -> Array:
+    """(6, 6) covariance of a random wrench of ``share`` of the body's weight, white on the scale of a block."""
+    force = (share * mass * gravity) ** 2 * (BLOCK / step)
+    return np.diag([force] * 3 + [force * size**2] * 3)
+
+
+def start_covariance(spread: float = 0.05, speed: float = 0.2) -> Array:
+    """(12, 12) covariance of a start state known to ``spread`` m and rad and ``speed`` m/s and rad/s."""
+    return np.diag([spread**2] * 6 + [speed**2] * 6)
+
+
+def track(bench: Bench, run: Run, theta: Array, start: State, start_spread: Array, noise: Array) -> Track | None:
+    """Track a run from ``start``; None where the motion cannot be followed.
+
+    start_spread (12, 12): covariance of the start. noise (6, 6): covariance of the random
+    wrench over one node interval (:func:`wrench_noise`).
+    """
+    model = model_at(bench.parameters, theta)
+    nodes = run.grid.nodes
+    block = max(8, int(round(BLOCK / run.grid.step)))
+    states, rotations = np.zeros((nodes, 12)), np.zeros((nodes, 3, 3))
+    covariance, wrenches = np.zeros((nodes, 12, 12)), np.zeros((nodes, 6))
+    outputs = np.zeros((nodes, layout.OUT_TENSION + model.cables))
+    state, P = start, start_spread
+    first = 0
+    while first < nodes - 1:
+        last = min(first + block, nodes - 1)
+        if nodes - 1 - last < block:
+            last = nodes - 1
+        part = run.between(first, last)
+        lin = linearise_run(bench, part, theta, state, start_only=True, extra_noise=noise)
+        if lin is None:
+            return None
+        corrections, wrench, filtered = smooth(
+            lin.motion.A,
+            lin.motion.B,
+            lin.Q,
+            lin.nodes,
+            lin.row_H,
+            lin.row_D,
+            lin.variance,
+            lin.plain,
+            P,
+        )
+        if not np.all(np.isfinite(corrections)):
+            return None
+        for k in range(last - first + 1):
+            moved = lin.motion.state(k).moved(corrections[k])
+            node = first + k
+            states[node] = moved.vector()
+            rotations[node] = moved.R_world_body
+        here = slice(first, last + 1)
+        covariance[here], wrenches[here] = filtered, wrench
+        change = np.einsum("nij,nj->ni", lin.motion.H, corrections) + np.einsum(
+            "nij,nj->ni", lin.motion.D, wrench
+        )
+        outputs[here] = lin.motion.outputs + change
+        # The last node's rows were used in this block: hand over one node earlier
+        x = states[last]
+        state = on_cables(model, State(x[:3], rotations[last], x[6:9], x[9:12]))
+        P = filtered[-1]
+        first = last
+    return Track(run.grid.step * np.arange(nodes), states, rotations, covariance, wrenches, outputs)

@@ -1,0 +1,104 @@
+"""Whether the ideal model explains the recordings, read off the residuals alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.prediction import Linearised, linearise_run
+from rig_identification.estimate.whiteness import Band, bands
+from rig_identification.result import Mismatch, ParameterEstimate
+
+if TYPE_CHECKING:
+    from rig_identification.estimate.identify import Fitted
+
+Array = NDArray[np.float64]
+
+#: Chance of calling a session that the model does explain unexplained.
+FALSE_ALARM = 0.005
+
+
+@dataclass(frozen=True)
+class Witness:
+    """One band of one residual, and how unlikely it is as noise."""
+
+    recording: str
+    channel: str
+    axis: str | None
+    band: Band
+
+
+def residual_witnesses(run: Run, linearised: Linearised, residual: Array) -> list[Witness]:
+    """Band powers of every channel of a run. residual (m,): whitened, in the rows of ``linearised``."""
+    out = []
+    for index, channel in enumerate(run.channels):
+        for a in range(channel.width):
+            rows = (linearised.channel == index) & (linearised.axis == a)
+            rate = (np.count_nonzero(rows) - 1) / max(float(np.ptp(channel.time)), 1e-9)
+            axis = "xyz"[a] if channel.width > 1 else None
+            out += [
+                Witness(run.recording.name, channel.device, axis, band) for band in bands(residual[rows], rate)
+            ]
+    return out
+
+
+def predictive_residual(fitted: Fitted, linearised: Linearised, full: Linearised) -> Array:
+    """Held-out innovations less what the parameters' own uncertainty accounts for.
+
+    The fit's posterior N(theta, information^-1) is carried into the held-out run: the
+    residual that stays after the best step within it (and in the run's own start) is what
+    no parameter inside its stated uncertainty explains.
+    """
+    p = fitted.problem.bench.parameters.size
+    information = fitted.evaluation.information
+    shared = information[:p, :p] - information[:p, p:] @ np.linalg.solve(information[p:, p:], information[p:, :p])
+    normal = full.jacobian.T @ full.jacobian
+    normal[:p, :p] += shared
+    step = np.linalg.lstsq(normal, full.jacobian.T @ full.residual, rcond=1e-14)[0]
+    _ = linearised
+    return np.asarray(full.residual - full.jacobian @ step)
+
+
+def judge(
+    fitted: Fitted,
+    parameters: tuple[ParameterEstimate, ...],
+    holdout_error: float | None,
+    training_error: float,
+    ordinary: float,
+) -> Mismatch:
+    """Verdict ``none`` or ``unexplained`` with its reason."""
+    witnesses: list[Witness] = []
+    for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
+        witnesses += residual_witnesses(run, linearised, linearised.residual)
+    for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
+        start = linearised.motion.state(0)
+        full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
+        if full is not None:
+            witnesses += residual_witnesses(run, full, predictive_residual(fitted, linearised, full))
+    beyond = [p for p in parameters if abs(p.value - p.nominal) >= ordinary * p.prior_std * (1.0 - 1e-6)]
+    reasons = []
+    if witnesses:
+        worst = min(witnesses, key=lambda w: w.band.log10_p)
+        limit = np.log10(FALSE_ALARM / len(witnesses))
+        if worst.band.log10_p < limit:
+            where = worst.channel + (f" {worst.axis}" if worst.axis else "")
+            reasons.append(
+                f"the residual of {where} in {worst.recording} is not noise: between {worst.band.low:.2g} and "
+                f"{worst.band.high:.2g} Hz it has {worst.band.power:.3g} times the power of white noise"
+            )
+    if not fitted.converged:
+        reasons.append("the fit did not settle")
+    if beyond:
+        names = ", ".join(p.name for p in beyond[:3]) + (" and others" if len(beyond) > 3 else "")
+        reasons.append(f"{names} would have to lie more than {ordinary:.0f} tolerances from the description")
+    scores = f"Held-out error {holdout_error:.3g}, fitted {training_error:.3g} (1 is a perfect model)." if (
+        holdout_error is not None
+    ) else f"Fitted error {training_error:.3g} (1 is a perfect model); no held-out run."
+    judged = "Judged by the residuals alone; no missing physics was searched for."
+    if reasons:
+        return Mismatch("unexplained", f"{'; '.join(reasons).capitalize()}. {scores} {judged}")
+    return Mismatch("none", f"Every residual is noise within its sensor's own. {scores} {judged}")
