@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 AXES = ("cx", "cy", "cz")
 FITS = ("determined", "undetermined")
 IMPROBABLE = 1e-6  # chance of a larger misfit below which readings and description disagree
-VAGUE = 0.25  # of the hinges' span: an element known less well than this is not known
+VAGUE = 0.25  # of the hinges' span, the weight or the mass: known less well than this is not known
 RIVAL = 25.0  # chi squared by which a second solution may be worse and still be one
 
 
@@ -49,7 +49,7 @@ class StaticPose:
     name: str
     position: Array  # (3,) m, body origin in world
     orientation: Array  # (4,) quaternion xyzw, rotates body vectors into world
-    tension: Array  # (n,) N
+    tension: Array  # (n,) N; NaN where open
     tension_std: Array  # (n,) N; infinite where open
     undetermined_tensions: int  # combinations that lengths and balance leave open
 
@@ -126,10 +126,9 @@ def _candidates(model: StaticModel, observation: StaticObservation) -> list[Hang
     measured = np.all(np.isfinite(observation.inclination))
     angles = observation.inclination if measured else np.zeros(2)
     tolerance = model.rig.tolerance
-    span = float(np.ptp(model.nominal.body, axis=0).max())
     noise = float(np.max(observation.inclination_std)) if measured else 0.1
     doubt = tolerance["cable_length"] + 2.0 * tolerance["hinge_position"]
-    doubt += span * (noise + tolerance["inclinometer_orientation"] + tolerance["level"])
+    doubt += model.span * (noise + tolerance["inclinometer_orientation"] + tolerance["level"])
     up = up_in_body(angles, mount(model.rig))
     poses = poses_with_known_inclination(model.nominal, up, 1e-6 + 10.0 * doubt)
     taut = [pose for pose in poses if pose.taut]
@@ -144,45 +143,49 @@ def _candidates(model: StaticModel, observation: StaticObservation) -> list[Hang
 
 
 def _solve(model: StaticModel, chosen: tuple[HangingPose, ...]) -> StaticSolution:
+    """Adjust with the vague beliefs of an anchored model, then without where nothing leans on them."""
+    anchored = StaticModel(model.rig, model.observations, anchored=True)
+    model, free = anchored, model
+    adjusted = _adjust(model, _start(model, chosen))
+    std = np.sqrt(np.diag(adjusted.covariance))
+    tensions = np.concatenate([std[model.tension_columns(k)] for k in range(len(chosen))])
+    if np.all(std[:3] < VAGUE * model.span) and np.all(tensions < VAGUE):
+        model = free
+        adjusted = _adjust(model, adjusted.state)
+    return _solution(model, adjusted)
+
+
+def _adjust(model: StaticModel, start: StaticState) -> Adjusted[StaticState]:
     # Metres, radians and weights: a belief may move by any number of its tolerances.
     longest = np.where(np.arange(model.size) < model.first_belief, 0.3, np.inf)
-    adjusted = adjust(_start(model, chosen), model.residuals, model.constraints, model.move, longest)
-    open_rows = np.linalg.norm(adjusted.open_directions, axis=1)
-    size = float(np.ptp(model.nominal.body, axis=0).max())
-    center_covariance = adjusted.covariance[:3, :3] + _open_part(adjusted.open_directions[:3], size)
-    unknown = np.sqrt(np.diag(center_covariance)) > VAGUE * size
+    return adjust(start, model.residuals, model.constraints, model.move, longest)
+
+
+def _solution(model: StaticModel, adjusted: Adjusted[StaticState]) -> StaticSolution:
+    covariance = adjusted.covariance
+    center_covariance = covariance[:3, :3].copy()
+    unknown = np.sqrt(np.diag(center_covariance)) > VAGUE * model.span
     center = np.where(unknown, np.nan, adjusted.state.center_of_mass)
     center_covariance[unknown, :] = center_covariance[:, unknown] = 0.0
     center_covariance[unknown, unknown] = np.inf
     names = tuple(name for name, lost in zip(AXES, unknown, strict=True) if lost)
-    poses = tuple(_pose(model, adjusted, open_rows, k) for k in range(len(chosen)))
-    status, statement = _judge(model, adjusted, poses, names)
-    mass_known = open_rows[3] < 1e-6
+    poses = tuple(_pose(model, adjusted, k) for k in range(len(model.observations)))
+    chi_squared, freedom = _misfit(model, adjusted)
+    status, statement = _judge(model, adjusted, poses, names, chi_squared, freedom)
+    mass_std = float(np.sqrt(covariance[3, 3])) + float(np.abs(adjusted.open_directions[3]).sum())
+    mass_known = mass_std < VAGUE
     return StaticSolution(
         status=status,
         statement=statement,
         center_of_mass=center,
         covariance=center_covariance,
         mass=adjusted.state.mass if mass_known else float("nan"),
-        mass_std=adjusted.state.mass * float(np.sqrt(adjusted.covariance[3, 3]))
-        if mass_known
-        else float("inf"),
+        mass_std=adjusted.state.mass * mass_std if mass_known else float("inf"),
         undetermined=names + (() if mass_known else ("m",)),
         poses=poses,
-        chi_squared=adjusted.chi_squared,
-        degrees_of_freedom=adjusted.degrees_of_freedom,
+        chi_squared=chi_squared,
+        degrees_of_freedom=freedom,
     )
-
-
-def _open_part(directions: Array, size: float) -> Array:
-    """(3, 3) m^2: along a direction that nothing determines the centre lies within the hinges' span.
-
-    One hanging leaves only a near-vertical line open; the horizontal elements are still known
-    to the line's slope times its length.
-    """
-    axes, sizes, _ = np.linalg.svd(directions)
-    open_axes = axes[:, : len(sizes)][:, sizes > 1e-6]
-    return np.asarray(size**2 * open_axes @ open_axes.T)
 
 
 def _start(model: StaticModel, chosen: tuple[HangingPose, ...]) -> StaticState:
@@ -223,20 +226,34 @@ def _mass_from_tensions(model: StaticModel) -> float | None:
     return None
 
 
-def _pose(model: StaticModel, adjusted: Adjusted[StaticState], open_rows: Array, k: int) -> StaticPose:
+def _misfit(model: StaticModel, adjusted: Adjusted[StaticState]) -> tuple[float, int]:
+    """Chi squared and degrees of freedom of all but the vague beliefs.
+
+    A belief counts as a degree of freedom by as much as the data, not itself, settle it: one
+    less its leverage.
+    """
+    if not model.anchored:
+        return adjusted.chi_squared, adjusted.degrees_of_freedom
+    residual, slope = model.anchor(adjusted.state)
+    leverage = np.einsum("ri,ij,rj->r", slope, adjusted.covariance, slope)
+    freedom = adjusted.degrees_of_freedom - float(np.sum(1.0 - leverage))
+    return adjusted.chi_squared - float(residual @ residual), max(0, round(freedom))
+
+
+def _pose(model: StaticModel, adjusted: Adjusted[StaticState], k: int) -> StaticPose:
     state, columns = adjusted.state, model.tension_columns(k)
     extra = 0.0 if model.observations[k].dummy is None else model.observations[k].dummy.mass  # type: ignore[union-attr]
     weight = (state.mass + extra) * model.rig.gravity
     at = balance(
         model.believed(state).suspension, np.zeros(3), state.position[k], state.attitude[k], state.tension[k]
     )
-    std = weight * np.sqrt(np.diag(adjusted.covariance)[columns])
+    std = np.sqrt(np.diag(adjusted.covariance)[columns])
     return StaticPose(
         name=model.observations[k].name,
         position=state.position[k],
         orientation=Rotation.from_matrix(state.attitude[k]).as_quat(),
-        tension=weight * state.tension[k],
-        tension_std=np.where(open_rows[columns] > 1e-6, np.inf, std),
+        tension=np.where(std > VAGUE, np.nan, weight * state.tension[k]),
+        tension_std=np.where(std > VAGUE, np.inf, weight * std),
         undetermined_tensions=undetermined_tensions(at, model.cables),
     )
 
@@ -246,18 +263,17 @@ def _judge(
     adjusted: Adjusted[StaticState],
     poses: tuple[StaticPose, ...],
     unknown: tuple[str, ...],
+    chi_squared: float,
+    freedom: int,
 ) -> tuple[str, str]:
     cables = [cable.name for cable in model.rig.cables]
-    chance = 1.0
-    if adjusted.degrees_of_freedom > 0:
-        chance = float(chi2.sf(adjusted.chi_squared, adjusted.degrees_of_freedom))
     if adjusted.constraint_error > 1e-7:
         return "inconsistent", "The cables cannot be brought to balance with these readings."
-    if chance < IMPROBABLE:
+    if freedom > 0 and float(chi2.sf(chi_squared, freedom)) < IMPROBABLE:
         settled = "" if adjusted.converged else " (the adjustment did not settle)"
         return "inconsistent", (
-            f"Readings and rig description do not agree: chi squared {adjusted.chi_squared:.3g} "
-            f"with {adjusted.degrees_of_freedom} degrees of freedom{settled}."
+            f"Readings and rig description do not agree: chi squared {chi_squared:.3g} "
+            f"with {freedom} degrees of freedom{settled}."
         )
     for pose in poses:
         pushing = [

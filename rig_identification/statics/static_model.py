@@ -3,6 +3,11 @@
 The state holds the centre of mass and the mass, each recording's pose and tensions, and the
 errors of what the lab believes about the rig, each in units of its tolerance. The balance of
 every recording constrains it; inclinations, tensions, the scale and the beliefs measure it.
+
+Anchored, two vague beliefs join them that hold for any body on any rig: its centre of mass is
+within the hinges' span of their middle, a tension within the weight of an even share. They
+keep directions that nothing measures from running away, and show by how little the posterior
+is narrower which those are.
 """
 
 from __future__ import annotations
@@ -49,8 +54,9 @@ class Believed:
 class StaticModel:
     """Residuals and constraints of a rig's static recordings (thesis section 2.2, n cables)."""
 
-    def __init__(self, rig: Rig, observations: tuple[StaticObservation, ...]) -> None:
+    def __init__(self, rig: Rig, observations: tuple[StaticObservation, ...], anchored: bool = False) -> None:
         self.rig = rig
+        self.anchored = anchored
         self.observations = observations
         self.cables = len(rig.cables)
         self.nominal = Suspension.of(rig)
@@ -73,6 +79,11 @@ class StaticModel:
         self.tolerance = np.concatenate([np.full(count, value) for _, count, value in blocks])
         self.first_belief = 4 + len(observations) * (6 + n)
         self.size = self.first_belief + start
+
+    @property
+    def span(self) -> float:
+        """m, the longest side of the box about the body's hinges."""
+        return float(np.ptp(self.nominal.body, axis=0).max())
 
     def pose_columns(self, k: int) -> slice:
         """Position and rotation vector of recording ``k`` in a step."""
@@ -139,6 +150,8 @@ class StaticModel:
         slope = np.zeros((len(state.beliefs), self.size))
         slope[:, self.first_belief :] = np.eye(len(state.beliefs))
         rows.append((state.beliefs, slope))
+        if self.anchored:
+            rows.append(self.anchor(state))
         return np.concatenate([r[0] for r in rows]), np.vstack([r[1] for r in rows])
 
     def _balance(self, state: StaticState, rig: Believed, k: int) -> tuple[Array, Array]:
@@ -212,6 +225,18 @@ class StaticModel:
         sharp = 1.0 / np.maximum(seen.tension_std[measured], SHARPEST_PART * weight)
         error = ((1.0 + rig.gain) * pull + rig.zero)[measured] - seen.tension[measured]
         return sharp * error, sharp[:, None] * slope[measured]
+
+    def anchor(self, state: StaticState) -> tuple[Array, Array]:
+        """The two vague beliefs as residuals, and their slopes."""
+        middle = self.nominal.body.mean(axis=0)
+        center = np.zeros((3, self.size))
+        center[:, :3] = np.eye(3) / self.span
+        rows = [((state.center_of_mass - middle) / self.span, center)]
+        for k in range(len(self.observations)):
+            slope = np.zeros((self.cables, self.size))
+            slope[:, self.tension_columns(k)] = np.eye(self.cables)
+            rows.append((state.tension[k] - 1.0 / self.cables, slope))
+        return np.concatenate([r[0] for r in rows]), np.vstack([r[1] for r in rows])
 
     def _scale(self, state: StaticState) -> tuple[Array, Array]:
         if self.rig.mass is None:
