@@ -150,7 +150,7 @@ def test_a_device_on_another_clock_is_left_aside(tmp_path: Path) -> None:
 
 
 def test_numbers_that_are_none(tmp_path: Path) -> None:
-    wrong = {0: float("nan"), 77: float("inf"), 300: -float("inf")}
+    wrong = {0: float("nan"), 77: float("inf"), 300: -float("inf"), 400: 1e300}
 
     def edit(topic: str, index: int, message: Any) -> Any:
         if topic != IMU or index not in wrong:
@@ -160,7 +160,7 @@ def test_numbers_that_are_none(tmp_path: Path) -> None:
 
     written, read = read_edited(tmp_path, edit)
     assert_subset(read.imu, written.imu, set(wrong))
-    assert (account(read).not_finite, account(read).gaps) == (3, 0)
+    assert (account(read).not_finite, account(read).gaps) == (4, 0)
 
 
 def test_clipped_values(tmp_path: Path) -> None:

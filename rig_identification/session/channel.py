@@ -31,6 +31,8 @@ _CAN_CLIP = ("tension", "exciter_force", "imu", "inclination")
 #: Channels that carry a quaternion in columns 3 to 6.
 _POSES = ("mocap", "ground_truth")
 _GAP = 1.5  # median intervals
+#: No channel measures this in SI units: damaged bytes read as a number.
+_ABSURD = 1e12
 #: Samples after which a value that never changes is worth a note.
 _STUCK = 50
 
@@ -118,6 +120,7 @@ def _clean(
     decoded: NDArray[np.float64],
 ) -> Channel:
     values = decoded[:, _COLUMNS[topic.channel]]
+    values = np.where(np.abs(values) < _ABSURD, values, np.nan)
     notes: tuple[str, ...] = ()
     if topic.channel in _POSES:
         values = _with_unit_quaternions(values)
