@@ -263,6 +263,14 @@ def test_compressed_data_that_is_corrupt(tmp_path: Path, storage: str, compressi
     assert "damaged or truncated" in refusal(lambda: read_session(folder))
 
 
+def test_a_damaged_length_that_asks_for_all_memory(folder: Path) -> None:
+    file, content = damage(folder, "dynamic_2")
+    at = 8 + 9 + int.from_bytes(content[9:17], "little")  # behind magic and header: the first chunk's record
+    assert content[at] == 0x06
+    file.write_bytes(content[: at + 1] + (1 << 50).to_bytes(8, "little") + content[at + 9 :])
+    assert "bag is damaged" in refusal(lambda: read_session(folder))
+
+
 def test_bag_without_metadata_or_file(folder: Path) -> None:
     (folder / "dynamic_2" / "metadata.yaml").rename(folder / "metadata.aside")
     assert "dynamic_2: metadata.yaml is missing" in refusal(lambda: read_session(folder))

@@ -64,8 +64,12 @@ def read_bag(folder: Path, wanted: Collection[str]) -> Bag:
             return _read(folder, reader, wanted)
         finally:
             reader.close()
-    except (InputError, MemoryError):
+    except InputError:
         raise
+    except MemoryError as err:  # a damaged length asks for any amount
+        raise InputError(
+            f"{folder}: bag is damaged, or larger than this machine's memory; copy it again"
+        ) from err
     except Exception as err:  # a damaged file fails in as many ways as there are parsers
         reason = one_line(err) or type(err).__name__
         raise InputError(
