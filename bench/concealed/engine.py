@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bench.concealed.effects.base import Effect, State
 from bench.concealed.effects.place import level_origin
@@ -19,6 +20,7 @@ from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
 RECORD_EVERY = 2  # steps
+RESTING = 1e-7  # m/s^2 or rad/s^2: what Newton's method must reach
 OIL = 5.0  # 1/s, damping per mass while the body settles
 
 
@@ -80,7 +82,7 @@ class Engine:
         put_body_force(applied, rotation, force, self.scene.devices.exciter_position)
         if hold:
             applied[:3] += hold * self.plan.pull
-            applied[3:6] += hold * np.cross(self.plan.pull_point, rotation.T @ self.plan.pull)
+            applied[3:6] += hold * _cross(self.plan.pull_point, rotation.T @ self.plan.pull)
         if self.forcing or self.driving:
             state = State(self.plan.name, time, position, rotation, velocity, rate)
             for law in self.forcing:
@@ -89,18 +91,35 @@ class Engine:
                 effect.drive(self.model, self.data, state)
 
     def rest(self, hold: float = 0.0) -> float:
-        """Move to equilibrium: damped motion first, then Newton's method; return the acceleration left."""
+        """Move to equilibrium; return the acceleration that is left there.
+
+        Damped motion first, then Newton's method. Where stops or unilateral cables bend the law too
+        sharply for Newton, damped motion goes on alone.
+        """
         self._guess()
         self._project()
-        self._settle(hold)
-        for _ in range(12):
-            residual = self._acceleration_at_rest(self.data.qpos.copy(), hold)
-            if np.linalg.norm(residual) < 1e-8:
-                break
-            self._newton_step(residual, hold)
+        self._settle(hold, 3.0)
+        if self._newton(hold) > RESTING:
+            self._settle(hold, 20.0)
         return float(np.linalg.norm(self._acceleration_at_rest(self.data.qpos.copy(), hold)))
 
-    def _settle(self, hold: float, seconds: float = 6.0) -> None:
+    def _newton(self, hold: float) -> float:
+        """Newton's method from here; go back if it leads nowhere. Return the acceleration left."""
+        best = self.data.qpos.copy()
+        start = least = np.linalg.norm(self._acceleration_at_rest(best, hold))
+        for _ in range(12):
+            pose = self.data.qpos.copy()
+            residual = self._acceleration_at_rest(pose, hold)
+            size = np.linalg.norm(residual)
+            if size <= least:
+                best, least = pose, size
+            if size < 1e-8 or size > 1e4 * max(start, 1.0):
+                break
+            self._newton_step(residual, hold)
+        self.data.qpos[:] = best
+        return float(least)
+
+    def _settle(self, hold: float, seconds: float) -> None:
         """Let the body come to rest in thick oil: Newton's method needs to start close."""
         mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_forward(self.model, self.data)
@@ -146,8 +165,11 @@ class Engine:
         """Bring the body to the plan's start, at rest; return the residual of that start."""
         if self.plan.start == "thesis":
             self._guess()
-            return self._project()
-        return self.rest(hold=0.0 if self.plan.start == "rest" else 1.0)
+            residual = self._project()
+        else:
+            residual = self.rest(hold=0.0 if self.plan.start == "rest" else 1.0)
+        self._start = self.data.qpos.copy()
+        return residual
 
     def _project(self) -> float:
         """Turn and shift the body by the least that gives every cable its length."""
@@ -177,9 +199,13 @@ class Engine:
         tip = pose[:3] + geometry.hinge @ rotation.reshape(3, 3).T
         return np.asarray(np.linalg.norm(tip - geometry.ceiling, axis=1) - geometry.length)
 
-    def run(self) -> Trajectory:
-        """Release the body and let it move for the plan's duration."""
-        motor, steps = self.plan.motor, self.steps
+    def run(self, seconds: float | None = None) -> Trajectory:
+        """From the start, let the body move for ``seconds``, by default the plan's duration."""
+        steps = self._steps(self.plan.duration if seconds is None else seconds)
+        motor = self.plan.motor
+        self.data.qpos[:] = self._start
+        self.data.qvel[:] = 0.0
+        self.data.qacc[:] = 0.0
         half = np.arange(2 * steps + 2) * (0.5 * STEP)
         if motor is None:
             shaft, force = np.zeros((len(half), 2)), np.zeros((len(half), 3))
@@ -202,20 +228,17 @@ class Engine:
     def stand(self) -> Trajectory:
         """Let the body hang at rest for the plan's duration."""
         self._acceleration_at_rest(self.data.qpos.copy(), 0.0)
-        count = self.steps // RECORD_EVERY + 1
+        count = self._steps(self.plan.duration) // RECORD_EVERY + 1
         row = self._row()
         return self._trajectory(np.tile(row, (count, 1)), np.zeros((count, 2)), np.zeros((count, 3)))
 
-    @property
-    def steps(self) -> int:
-        """Steps that cover the recording, its late start included."""
-        return RECORD_EVERY * round((self.plan.duration + self.plan.first_sample) / (STEP * RECORD_EVERY))
+    def _steps(self, seconds: float) -> int:
+        """Steps that cover a recording, its late start included."""
+        return RECORD_EVERY * round((seconds + self.plan.first_sample) / (STEP * RECORD_EVERY))
 
     def _row(self) -> Array:
         data = self.data
-        return np.concatenate(
-            [data.qpos[:7], data.qvel[:6], data.qacc[:6], self._tension(), self._gap(data.qpos)]
-        )
+        return np.concatenate([data.qpos[:7], data.qvel[:6], data.qacc[:6], self._tension()])
 
     def _tension(self) -> Array:
         for effect in self.effects:
@@ -238,5 +261,16 @@ class Engine:
             tension=rows[:, 19 : 19 + n],
             force=force,
             shaft=shaft,
-            stretch=rows[:, 19 + n : 19 + 2 * n],
+            stretch=self._stretch(rows[:, :3], quaternion),
         )
+
+    def _stretch(self, position: Array, quaternion: Array) -> Array:
+        geometry = self.scene.geometry
+        rotation = Rotation.from_quat(quaternion).as_matrix()
+        tip = position[:, None] + np.einsum("nij,cj->nci", rotation, geometry.hinge)
+        return np.asarray(np.linalg.norm(tip - geometry.ceiling, axis=2) - geometry.length)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    # numpy's own takes longer than a step of MuJoCo.
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

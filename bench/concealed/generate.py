@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bench.concealed import truth as truths
 from bench.concealed.draw import draw_scene, scaled
@@ -23,6 +24,7 @@ from rig_identification.recording import Session
 
 LEAST_TENSION = 0.02  # of the weight: clean scenes stay clear of slack cables by this
 MOST_RATE = 0.8  # rad/s
+START_ACCURACY = 1e-4  # m/s^2 or rad/s^2, m from the level pose
 PROBE = 8.0  # s
 LEAST_RANGE = 0.035  # m, of the body origin
 
@@ -72,32 +74,43 @@ def simulate(scene: Scene, effects: Sequence[Effect]) -> list[Trajectory]:
 
 
 def _simulate_one(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Trajectory:
+    engine = _released(scene, effects, plan)
+    return engine.run() if plan.kind == "dynamic" else engine.stand()
+
+
+def _released(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Engine:
     engine = Engine(scene, effects, plan)
     residual = engine.release()
-    if not residual < 1e-6:
+    if not residual < START_ACCURACY:
         raise RuntimeError(f"seed {scene.seed}, {plan.name}: start not found, residual {residual:.2g}")
-    return engine.run() if plan.kind == "dynamic" else engine.stand()
+    return engine
 
 
 def _calm_scene(scene: Scene) -> tuple[Scene, list[Trajectory]]:
     """Scale each run until its cables stay clear of slack and its motion is worth recording."""
     plans, paths = [], []
     for plan in scene.plans:
-        for attempt in range(10):
-            # The first seconds tell most; only what passes them is run in full.
-            probe = replace(plan, duration=min(plan.duration, PROBE))
-            share = _share(scene, _simulate_one(scene, [], probe)) if attempt < 6 else 1.0
-            if share == 1.0:
-                path = _simulate_one(scene, [], plan)
-                share = min(_share(scene, path), 1.0)
-            if share == 1.0:
-                break
-            plan = scaled(plan, share)
-        else:
-            raise RuntimeError(f"seed {scene.seed}, {plan.name}: no fitting motion found")
+        plan, path = _calm_run(scene, plan)
         plans.append(plan)
         paths.append(path)
-    return replace(scene, plans=tuple(plans)), paths
+    at_rest = (paths[0].position[0], Rotation.from_quat(paths[0].quaternion[0]).as_matrix())
+    return replace(scene, plans=tuple(plans), at_rest=at_rest), paths
+
+
+def _calm_run(scene: Scene, plan: Plan) -> tuple[Plan, Trajectory]:
+    if plan.kind == "static":
+        return plan, _simulate_one(scene, [], plan)
+    for attempt in range(12):
+        engine = _released(scene, [], plan)
+        # The first seconds tell most; only what passes them is run in full.
+        share = _share(scene, engine.run(min(plan.duration, PROBE))) if attempt < 6 else 1.0
+        if share == 1.0:
+            path = engine.run()
+            share = min(_share(scene, path), 1.0)
+        if share == 1.0:
+            return plan, path
+        plan = scaled(plan, share)
+    raise RuntimeError(f"seed {scene.seed}, {plan.name}: no fitting motion found")
 
 
 def _share(scene: Scene, path: Trajectory) -> float:
@@ -105,9 +118,8 @@ def _share(scene: Scene, path: Trajectory) -> float:
     weight = scene.body.mass * scene.rig.gravity
     if path.tension.min() < LEAST_TENSION * weight or np.abs(path.rate).max() > MOST_RATE:
         return 0.6
-    # At rest by design, or moving enough to tell an inertia.
-    still = np.ptp(path.position, axis=0).max() == 0.0
-    return 1.0 if still or np.ptp(path.position, axis=0).max() > LEAST_RANGE else 1.5
+    # Enough motion to tell an inertia.
+    return 1.0 if np.ptp(path.position, axis=0).max() > LEAST_RANGE else 1.5
 
 
 def effect_over_noise(

@@ -128,3 +128,4 @@ class Scene:
     errors: SensorErrors
     level: Array  # (3,) rotation vector, rad: turns described ceiling points into true ones
     plans: tuple[Plan, ...]
+    at_rest: tuple[Array, Array] | None = None  # position (3,) and rotation (3, 3) of the body, hanging

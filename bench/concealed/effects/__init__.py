@@ -48,11 +48,11 @@ def _names(rng: np.random.Generator, kind: str) -> list[str]:
     if kind == "outside":
         return [str(rng.choice(list(OUTSIDE)))]
     if kind == "pair":
-        return _pair(rng)
+        return draw_pair(rng)
     return kind.split("+")
 
 
-def _pair(rng: np.random.Generator) -> list[str]:
+def draw_pair(rng: np.random.Generator) -> list[str]:
     """Two of the table that can be in one mechanism."""
     while True:
         pair = [str(n) for n in rng.choice(list(CATALOGUE), 2, replace=False)]

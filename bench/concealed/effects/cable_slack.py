@@ -15,6 +15,9 @@ from bench.concealed.mechanism import CONSTRAINT_TIME, IMPEDANCE
 from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
+LEAST_SLACK = 0.02  # s, of one cable over the session
+REBOUND = 0.2  # s: a cable that snaps tight bounces; that is one spell
+
 
 @dataclass(frozen=True)
 class CableSlack(Effect):
@@ -68,12 +71,20 @@ class CableSlack(Effect):
         times, slack_time = [], np.zeros(len(scene.geometry.length))
         for plan, path in zip(scene.plans, paths, strict=True):
             slack = path.tension < 1.0
-            slack_time += slack.sum(axis=0)
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], slack.any(axis=1), [0]])))
-            for first, last in zip(edges[::2], edges[1::2], strict=True):
-                start, end = (path.time[first], path.time[last - 1]) - np.array(plan.first_sample)
-                if end > 0.0:
-                    times.append({"recording": plan.name, "start": float(max(start, 0.0)), "end": float(end)})
-        if not times:
+            slack_time += path.time[1] * slack.sum(axis=0)
+            for first, last in _spells(path.time[slack.any(axis=1)] - plan.first_sample):
+                if last > 0.0:
+                    times.append({"recording": plan.name, "start": max(first, 0.0), "end": last})
+        if slack_time.max() < LEAST_SLACK:
             return None
         return {"channel": f"cable_{int(np.argmax(slack_time)) + 1}", "times": times}
+
+
+def _spells(time: Array) -> list[tuple[float, float]]:
+    """Start and end of each spell of instants no further apart than ``REBOUND``."""
+    if len(time) == 0:
+        return []
+    breaks = np.flatnonzero(np.diff(time) > REBOUND)
+    starts = time[np.concatenate([[0], breaks + 1])]
+    ends = time[np.concatenate([breaks, [len(time) - 1]])]
+    return [(float(a), float(b)) for a, b in zip(starts, ends, strict=True)]

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from bench.concealed.effects.base import Effect, State, log_size, quantity
-from bench.concealed.effects.place import level_origin, tank
+from bench.concealed.effects.place import hanging, tank
 from bench.concealed.scene import Array, Scene
 
 
 @dataclass(frozen=True)
 class HardeningTether(Effect):
-    """Force -k d^3 along one world axis, d from where the point is while the body hangs level."""
+    """Force -k d^3 along one world axis, d from where the point is while the body hangs at rest."""
 
     name = "hardening_tether"
     outside = True
@@ -27,10 +27,10 @@ class HardeningTether(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> HardeningTether:
-        """Sized by its force at 5 cm."""
+        """Sized by its force at 2 cm."""
         place = tank(rng, scene)
         force = log_size(size, 0.0003, 0.03) * scene.body.mass * scene.rig.gravity
-        return cls(force / 0.05**3, place, level_origin(scene) + place, int(rng.integers(2)))
+        return cls(force / 0.02**3, place, hanging(scene, place), int(rng.integers(2)))
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from bench.concealed.effects.base import Effect, State, log_size, quantity
-from bench.concealed.effects.place import level_origin, tank
+from bench.concealed.effects.place import hanging, tank
 from bench.concealed.scene import Array, Scene
 
 
 @dataclass(frozen=True)
 class MagneticBrake(Effect):
-    """Force -c v exp(-d^2 / 2 s^2) on a body point, d from where it is while the body hangs level."""
+    """Force -c v exp(-d^2 / 2 s^2) on a body point, d from where it is while the body hangs at rest."""
 
     name = "magnetic_brake"
     outside = True
@@ -29,7 +29,7 @@ class MagneticBrake(Effect):
         """From a fridge magnet to a real brake, in proportion to the body."""
         place = tank(rng, scene)
         damping = log_size(size, 0.005, 0.6) * scene.body.mass
-        return cls(damping, rng.uniform(0.015, 0.04), place, level_origin(scene) + place)
+        return cls(damping, rng.uniform(0.015, 0.04), place, hanging(scene, place))
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""

@@ -41,6 +41,15 @@ def level_origin(scene: Scene) -> Array:
     for _ in range(50):
         arm = origin + geometry.hinge - geometry.ceiling
         length = np.linalg.norm(arm, axis=1)
-        step = np.linalg.lstsq(arm / length[:, None], length - geometry.length, rcond=None)[0]
+        # Nearly parallel cables say nothing of where it is sideways: weak directions stay as they are.
+        step = np.linalg.lstsq(arm / length[:, None], length - geometry.length, rcond=0.05)[0]
         origin = origin - step
     return np.asarray(origin)
+
+
+def hanging(scene: Scene, position: Array) -> Array:
+    """(3,) m, world: where a body point is while the body hangs at rest, nothing left out."""
+    if scene.at_rest is None:
+        return level_origin(scene) + position
+    origin, rotation = scene.at_rest
+    return np.asarray(origin + rotation @ position)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
 from bench.concealed.scene import Plan, Scene
-from bench.concealed.signals import Samples
+from bench.concealed.signals import Samples, Trajectory
 
 
 @dataclass(frozen=True)
@@ -38,3 +39,12 @@ class Saturation(Effect):
         values = samples.values.copy()
         values[:, self.axis] = np.clip(values[:, self.axis], -self.limit, self.limit)
         return replace(samples, values=values)
+
+    def observe(self, scene: Scene, paths: Sequence[Trajectory]) -> dict[str, Any] | None:
+        """See :class:`Effect`: nothing is clipped unless the axis turns faster than the limit."""
+        clipped = [np.abs(p.rate @ scene.devices.imu_rotation)[:, self.axis] > self.limit for p in paths]
+        return {} if np.mean(clipped[2]) > 0.02 else None
+
+    def stronger(self) -> Effect:
+        """See :class:`Effect`."""
+        return replace(self, limit=0.6 * self.limit)

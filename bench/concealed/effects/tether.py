@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
-from bench.concealed.effects.place import level_origin, tank
+from bench.concealed.effects.place import hanging, tank
 from bench.concealed.scene import Array, Plan, Scene
 
 
@@ -20,22 +20,20 @@ class Tether(Effect):
     mechanical = True
     stiffness: float  # N/m
     position: Array  # (3,) m, body
-    axis: int  # it runs along this world axis while the body hangs level
+    axis: int  # it runs along this world axis while the body hangs at rest
     side: float  # -1 or 1
-    preload: float  # m it is stretched by while the body hangs level
+    preload: float  # m it is stretched by while the body hangs at rest
     reach: float  # m from the wall to the body
+    wall: Array  # (3,) m, world
 
     @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> Tether:
         """From a sensor lead to a stiff hose."""
-        return cls(
-            log_size(size, 5.0, 1500.0),
-            tank(rng, scene),
-            int(rng.integers(2)),
-            float(rng.choice([-1.0, 1.0])),
-            rng.uniform(0.08, 0.2),
-            rng.uniform(0.8, 2.0),
-        )
+        place, axis = tank(rng, scene), int(rng.integers(2))
+        reach = rng.uniform(0.8, 2.0)
+        side = float(rng.choice([-1.0, 1.0]))
+        wall = hanging(scene, place) + side * reach * np.eye(3)[axis]
+        return cls(log_size(size, 5.0, 1500.0), place, axis, side, rng.uniform(0.08, 0.2), reach, wall)
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
@@ -48,8 +46,7 @@ class Tether(Effect):
 
     def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
         """See :class:`Effect`."""
-        wall = level_origin(scene) + self.position + self.side * self.reach * np.eye(3)[self.axis]
-        spec.worldbody.add_site(name="wall", pos=wall)
+        spec.worldbody.add_site(name="wall", pos=self.wall)
         spec.body("body").add_site(name="tethered", pos=self.position)
         tendon = spec.add_tendon(
             name="tether", stiffness=self.stiffness, springlength=[0.0, self.reach - self.preload]

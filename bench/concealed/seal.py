@@ -1,0 +1,93 @@
+"""Truths of a run of sessions, written to one file whose SHA-256 is published before anyone looks.
+
+The seeds alone do not tell what is in a session: kinds and sizes follow from a salt that is drawn here and
+kept in the sealed file. Commit the seeds and the digest, examine the sessions, open the file afterwards.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import secrets
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.concealed.effects import CATALOGUE, OUTSIDE, draw_pair
+from bench.concealed.generate import make_session
+
+CLEAN_SHARE, PAIR_SHARE, OUTSIDE_SHARE = 1 / 3, 0.1, 0.15
+
+
+def compose(seeds: Sequence[int], salt: str) -> list[dict[str, Any]]:
+    """Kind and size of every session: a third clean, some pairs, some outside, sizes evenly from 0 to 1.
+
+    The rest goes through the table in a random order, so that each effect has its turn.
+    """
+    rng = np.random.default_rng(int.from_bytes(hashlib.sha256(salt.encode()).digest()[:8], "big"))
+    count = len(seeds)
+    clean, pairs, outside = (round(share * count) for share in (CLEAN_SHARE, PAIR_SHARE, OUTSIDE_SHARE))
+    kinds = ["clean"] * clean + ["+".join(draw_pair(rng)) for _ in range(pairs)]
+    kinds += _in_turn(rng, list(OUTSIDE), outside)
+    kinds += _in_turn(rng, list(CATALOGUE), count - len(kinds))
+    sizes = (rng.permutation(count) + rng.uniform(size=count)) / count
+    order = rng.permutation(count)
+    return [
+        {"seed": int(seed), "kind": kinds[k], "size": float(sizes[k])}
+        for seed, k in zip(seeds, order, strict=True)
+    ]
+
+
+def _in_turn(rng: np.random.Generator, names: list[str], count: int) -> list[str]:
+    chosen: list[str] = []
+    while len(chosen) < count:
+        chosen += [str(n) for n in rng.permutation(names)]
+    return chosen[:count]
+
+
+def seal(
+    seeds: Sequence[int], path: Path, salt: str, duration: float = 32.0, sessions: Path | None = None
+) -> str:
+    """Write the truths of all sessions to ``path``; return its SHA-256 in hex.
+
+    ``sessions``: a folder to write the sessions themselves to, each without its truth.
+    """
+    entries = []
+    for k, entry in enumerate(compose(seeds, salt)):
+        session, truth = make_session(
+            entry["seed"], kind=entry["kind"], size=entry["size"], duration=duration
+        )
+        entries.append({**entry, "duration": duration, "truth": truth})
+        if sessions is not None:
+            from rig_identification.session import write_session
+
+            write_session(session, sessions / session.name)
+        print(f"{k + 1} of {len(seeds)}: {session.name}", file=sys.stderr)
+    path.write_text(json.dumps({"salt": salt, "sessions": entries}, indent=1))
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m bench.concealed.seal", description=__doc__)
+    parser.add_argument("--first-seed", type=int, required=True)
+    parser.add_argument("--count", type=int, default=120)
+    parser.add_argument("--duration", type=float, default=32.0, help="of each run, s")
+    parser.add_argument("--salt", default=None, help="default: drawn; give one to repeat a sealing")
+    parser.add_argument("--sessions", type=Path, default=None, help="folder to write the sessions to")
+    parser.add_argument("--out", type=Path, required=True)
+    options = parser.parse_args(arguments)
+    seeds = range(options.first_seed, options.first_seed + options.count)
+    digest = seal(
+        seeds, options.out, options.salt or secrets.token_hex(16), options.duration, options.sessions
+    )
+    print(f"seeds {seeds[0]} to {seeds[-1]}: SHA-256 {digest}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
