@@ -152,6 +152,39 @@ def test_unknown_mass_comes_from_the_load_cells():
     assert 0.1 < solution.mass_std < 2.0  # four zeros of 3 N weigh 0.6 kg
 
 
+def twisting_rig():
+    """Three long cables from a small triangle to a wide body: two headings fit one inclination."""
+    rng = np.random.default_rng(6)
+    count = int(rng.integers(2, 5))
+    angle = np.arange(count) * 2.0 * np.pi / count + rng.uniform(-0.3, 0.3, count)
+    ceiling = np.c_[
+        rng.uniform(0.05, 0.6) * np.cos(angle),
+        rng.uniform(0.05, 0.6) * np.sin(angle),
+        rng.uniform(-0.1, 0.1, count),
+    ]
+    body = np.c_[
+        np.cos(angle + rng.uniform(-0.3, 0.3, count)), 0.8 * np.sin(angle), rng.uniform(-0.3, 0.3, count)
+    ]
+    length = np.linalg.norm(np.array([0.0, 0.0, -2.5]) + body - ceiling, axis=1)
+    cables = tuple(Cable(f"c{i}", ceiling[i], body[i], float(length[i])) for i in range(count))
+    return Rig(9.81, cables, mass=1000.0), rng.uniform(-0.1, 0.1, 3) + np.array([0.0, 0.0, -0.5])
+
+
+def test_two_solutions_are_both_named_and_tensions_decide():
+    rig, center = twisting_rig()
+    rest = find_equilibria(rig, rig.mass, center).equilibria[0]
+    solution = solve_center_of_mass(rig, observe_equilibrium(rig, rest, inclination_std=1e-4))
+    assert solution.status == "ambiguous"
+    every = [solution.center_of_mass, *(other.center_of_mass for other in solution.alternatives)]
+    assert min(np.abs(c - center)[:2].max() for c in every) < 0.02
+    assert max(np.abs(c - center)[:2].max() for c in every) > 0.03
+    cells = observe_equilibrium(rig, rest, inclination_std=1e-4, tension_std=0.1)
+    decided = solve_center_of_mass(rig, cells)
+    assert decided.status == "undetermined"
+    assert decided.undetermined == ("cz",)
+    assert np.abs(decided.center_of_mass - center)[:2].max() < 0.02
+
+
 def test_readings_that_no_pose_has():
     rig, combined, _, dummy = table_2_1()
     seen = observe_both(rig, rig, rig.mass, combined, dummy)
