@@ -9,8 +9,8 @@ from rig_identification.thesis.estimators import (
     SEARCHES,
     fit_euler_predictor,
     fit_momentum,
-    tensor,
 )
+from rig_identification.thesis.predictor import tensor
 
 INERTIA = np.array([[1617.0, -20.0, 15.0], [-20.0, 365.0, 70.0], [15.0, 70.0, 1785.0]])
 GUESS = tensor(np.array([1000.0, 10.0, 10.0, 300.0, 40.0, 1000.0]))

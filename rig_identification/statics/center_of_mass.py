@@ -16,70 +16,30 @@ centre of mass, stay open until they are measured.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
 
 from rig_identification.errors import InputError
-from rig_identification.rig import CarryingFrame, Rig
+from rig_identification.rig import Rig
 from rig_identification.statics.adjustment import Adjusted, adjust
-from rig_identification.statics.balance import balance, is_stable, skew, undetermined_tensions
+from rig_identification.statics.balance import balance, skew, undetermined_tensions
 from rig_identification.statics.equilibrium import hanging_mass
+from rig_identification.statics.judgement import judge, misfit
 from rig_identification.statics.observation import StaticObservation, mount, up_in_body
 from rig_identification.statics.poses import HangingPose, poses_with_known_inclination, poses_with_known_mass
 from rig_identification.statics.static_model import StaticModel, StaticState
+from rig_identification.statics.static_solution import StaticPose, StaticSolution
 
 Array = NDArray[np.float64]
 
 AXES = ("cx", "cy", "cz")
 FITS = ("determined", "undetermined")
-IMPROBABLE = 1e-6  # chance of a larger misfit below which readings and description disagree
 VAGUE = 0.25  # of the hinges' span, the weight or the mass: known less well than this is not known
 RIVAL = 25.0  # chi squared by which a second solution may be worse and still be one
-
-
-@dataclass(frozen=True)
-class StaticPose:
-    """Where the body hung in one recording."""
-
-    name: str
-    position: Array  # (3,) m, body origin in world
-    orientation: Array  # (4,) quaternion xyzw, rotates body vectors into world
-    tension: Array  # (n,) N; NaN where open
-    tension_std: Array  # (n,) N; infinite where open
-    undetermined_tensions: int  # combinations that lengths and balance leave open
-
-
-@dataclass(frozen=True)
-class StaticSolution:
-    """The centre of mass and how well it is known.
-
-    ``status``: ``"determined"``; ``"undetermined"``, the elements of ``undetermined`` are
-    open; ``"ambiguous"``, ``alternatives`` fit as well; ``"slack"``, a cable would have to push;
-    ``"inconsistent"``, readings and description do not agree within their noise;
-    ``"no_pose"``, no pose has these inclinations and lengths (then nothing else is given).
-    """
-
-    status: str
-    statement: str
-    center_of_mass: Array  # (3,) m, body; NaN where undetermined
-    covariance: Array  # (3, 3) m^2; infinite variance where undetermined
-    mass: float  # kg, all but dummies
-    mass_std: float  # kg
-    undetermined: tuple[str, ...] = ()
-    poses: tuple[StaticPose, ...] = ()
-    chi_squared: float = float("nan")
-    degrees_of_freedom: int = 0
-    alternatives: tuple[StaticSolution, ...] = ()
-
-    @property
-    def std(self) -> Array:
-        """(3,) m, one standard deviation of the centre of mass."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
 def solve_center_of_mass(rig: Rig, *observations: StaticObservation) -> StaticSolution:
@@ -110,15 +70,6 @@ def _is_rival(best: StaticSolution, other: StaticSolution) -> bool:
         return False
     apart = np.abs(other.center_of_mass - best.center_of_mass)
     return bool(np.any(apart > 3.0 * np.hypot(best.std, other.std) + 1e-6))
-
-
-def without_frame(solution: StaticSolution, frame: CarryingFrame) -> tuple[float, Array, Array]:
-    """Mass (kg), centre of mass (3,) m and its covariance without the carrying frame, taken as exact."""
-    mass = solution.mass - frame.mass
-    center = (solution.mass * solution.center_of_mass - frame.mass * frame.center_of_mass) / mass
-    by_mass = (solution.center_of_mass - center) / mass
-    covariance = (solution.mass / mass) ** 2 * solution.covariance
-    return mass, center, covariance + solution.mass_std**2 * np.outer(by_mass, by_mass)
 
 
 def _candidates(model: StaticModel, observation: StaticObservation) -> list[HangingPose]:
@@ -170,8 +121,8 @@ def _solution(model: StaticModel, adjusted: Adjusted[StaticState]) -> StaticSolu
     center_covariance[unknown, unknown] = np.inf
     names = tuple(name for name, lost in zip(AXES, unknown, strict=True) if lost)
     poses = tuple(_pose(model, adjusted, k) for k in range(len(model.observations)))
-    chi_squared, freedom = _misfit(model, adjusted)
-    status, statement = _judge(model, adjusted, poses, names, chi_squared, freedom)
+    chi_squared, freedom = misfit(model, adjusted)
+    status, statement = judge(model, adjusted, poses, names, chi_squared, freedom)
     mass_std = float(np.sqrt(covariance[3, 3])) + float(np.abs(adjusted.open_directions[3]).sum())
     mass_known = mass_std < VAGUE
     return StaticSolution(
@@ -226,20 +177,6 @@ def _mass_from_tensions(model: StaticModel) -> float | None:
     return None
 
 
-def _misfit(model: StaticModel, adjusted: Adjusted[StaticState]) -> tuple[float, int]:
-    """Chi squared and degrees of freedom of all but the vague beliefs.
-
-    A belief counts as a degree of freedom by as much as the data, not itself, settle it: one
-    less its leverage.
-    """
-    if not model.anchored:
-        return adjusted.chi_squared, adjusted.degrees_of_freedom
-    residual, slope = model.anchor(adjusted.state)
-    leverage = np.einsum("ri,ij,rj->r", slope, adjusted.covariance, slope)
-    freedom = adjusted.degrees_of_freedom - float(np.sum(1.0 - leverage))
-    return adjusted.chi_squared - float(residual @ residual), max(0, round(freedom))
-
-
 def _pose(model: StaticModel, adjusted: Adjusted[StaticState], k: int) -> StaticPose:
     state, columns = adjusted.state, model.tension_columns(k)
     extra = 0.0 if model.observations[k].dummy is None else model.observations[k].dummy.mass  # type: ignore[union-attr]
@@ -258,56 +195,9 @@ def _pose(model: StaticModel, adjusted: Adjusted[StaticState], k: int) -> Static
     )
 
 
-def _judge(
-    model: StaticModel,
-    adjusted: Adjusted[StaticState],
-    poses: tuple[StaticPose, ...],
-    unknown: tuple[str, ...],
-    chi_squared: float,
-    freedom: int,
-) -> tuple[str, str]:
-    cables = [cable.name for cable in model.rig.cables]
-    if adjusted.constraint_error > 1e-7:
-        return "inconsistent", "The cables cannot be brought to balance with these readings."
-    if freedom > 0 and float(chi2.sf(chi_squared, freedom)) < IMPROBABLE:
-        settled = "" if adjusted.converged else " (the adjustment did not settle)"
-        return "inconsistent", (
-            f"Readings and rig description do not agree: chi squared {chi_squared:.3g} "
-            f"with {freedom} degrees of freedom{settled}."
-        )
-    for pose in poses:
-        pushing = [
-            name for name, t, s in zip(cables, pose.tension, pose.tension_std, strict=True) if t < -3.0 * s
-        ]
-        if pushing:
-            return "slack", f"{pose.name}: {', '.join(pushing)} would have to push; it must hang slack."
-    if unknown:
-        redundant = max(pose.undetermined_tensions for pose in poses)
-        why = f"; {redundant} combination(s) of tensions stay open without load cells" if redundant else ""
-        return "undetermined", f"The recordings do not determine {', '.join(unknown)}{why}."
-    if not _stable(model, adjusted.state):
-        return "slack", "The pose found is balanced but would not stay: it is no equilibrium that hangs."
-    return "determined", "The centre of mass is determined."
-
-
-def _stable(model: StaticModel, state: StaticState) -> bool:
-    suspension = model.believed(state).suspension
-    for k, observation in enumerate(model.observations):
-        _, arm = hanging_mass(state.mass, state.center_of_mass, observation.dummy)
-        at = balance(suspension, arm, state.position[k], state.attitude[k], state.tension[k])
-        if not is_stable(at, model.cables):
-            return False
-    return True
-
-
 def _ambiguous(best: StaticSolution, rivals: tuple[StaticSolution, ...]) -> StaticSolution:
-    fields = {name: getattr(best, name) for name in best.__dataclass_fields__}
-    fields |= {
-        "status": "ambiguous",
-        "statement": f"{1 + len(rivals)} solutions fit the readings; a measured tension may decide.",
-        "alternatives": rivals,
-    }
-    return StaticSolution(**fields)
+    statement = f"{1 + len(rivals)} solutions fit the readings; a measured tension may decide."
+    return replace(best, status="ambiguous", statement=statement, alternatives=rivals)
 
 
 def _nothing(statement: str) -> StaticSolution:
