@@ -148,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--size", type=float, default=None, help="0 (faint) to 1 (strong)")
     parser.add_argument("--duration", type=float, default=32.0, help="of each run, s")
     parser.add_argument("--storage", default="mcap", choices=["mcap", "sqlite3"])
-    parser.add_argument("--compression", default=None, help="none, message or file")
+    parser.add_argument("--compression", default="none", help="none, message, file or storage")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args(arguments)
     # Imported here: sessions in memory need no bag writer.
