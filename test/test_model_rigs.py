@@ -73,9 +73,7 @@ DRUM = np.array([300.0, 0.02, -0.03, -0.3, 60.0, 3.0, -2.0, 75.0, 4.0, 90.0])
 
 def circle(radius: Array | float, angles: Array, height: float) -> Array:
     """(n, 3) points at ``angles`` (rad) on a circle about the vertical."""
-    return np.stack(
-        [radius * np.cos(angles), radius * np.sin(angles), np.full(angles.shape, height)], axis=1
-    )
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full(angles.shape, height)], axis=1)
 
 
 def trifilar(swing: float = 0.5) -> Sample:
@@ -127,9 +125,7 @@ def moving(sample: Sample, model: RigModel, seed: int) -> State:
     """The sample's start pose with a velocity that its cables allow."""
     rng = np.random.default_rng(seed)
     start = sample.start
-    state = State(
-        start.position, start.R_world_body, rng.uniform(-0.4, 0.4, 3), rng.uniform(-0.4, 0.4, 3)
-    )
+    state = State(start.position, start.R_world_body, rng.uniform(-0.4, 0.4, 3), rng.uniform(-0.4, 0.4, 3))
     return on_cables(model, state)
 
 

@@ -339,7 +339,8 @@ def propagate(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     after = forces[node, i] if last else forces[node + 1, i]
                     force[i] = forces[node, i] + at * (after - forces[node, i])
-                    rate[i] = force_rates[node, i]
+                    rate_after = force_rates[node, i] if last else force_rates[node + 1, i]
+                    rate[i] = force_rates[node, i] + at * (rate_after - force_rates[node, i])
                 rotation(reference, y, R)
                 if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
                     return node

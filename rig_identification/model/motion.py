@@ -108,7 +108,7 @@ class Input:
 
     step: float  # s between nodes
     force: Array  # (N, 3) exciter force, exciter frame, N, linear between nodes
-    force_rate: Array  # (N, 3) N/s
+    force_rate: Array  # (N, 3) N/s, linear between nodes
     wrench: Array  # (N, 6) further force and moment about the datum, body axes, held over each interval
 
     @staticmethod
