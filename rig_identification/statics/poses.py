@@ -77,53 +77,81 @@ def _turned(attitudes: Array, heading: float) -> Array:
     return np.asarray(Rotation.from_rotvec([0.0, 0.0, heading]).as_matrix() @ attitudes)
 
 
+@dataclass(frozen=True)
+class _Batch:
+    """Many trial poses at once, with the equations' values there."""
+
+    position: Array  # (K, 3)
+    attitude: Array  # (K, 3, 3)
+    tension: Array  # (K, n)
+    residual: Array  # (K, rows)
+    slope: Array  # (K, rows, unknowns)
+
+    @property
+    def cost(self) -> Array:
+        return np.asarray(np.sum(self.residual**2, -1))
+
+    def chosen(self, mine: NDArray[np.bool_], other: _Batch) -> _Batch:
+        """Mine where ``mine``, else the other's."""
+        fields = []
+        for name in ("position", "attitude", "tension", "residual", "slope"):
+            here = getattr(self, name)
+            mask = mine.reshape((-1,) + (1,) * (here.ndim - 1))
+            fields.append(np.where(mask, here, getattr(other, name)))
+        return _Batch(*fields)
+
+
+class _System:
+    """The equations in the unknowns of one of the two searches."""
+
+    def __init__(self, suspension: Suspension, arm_of_mass: Array, known_inclination: bool) -> None:
+        cables = len(suspension.length)
+        self.suspension, self.arm = suspension, arm_of_mass
+        self.rows = np.arange(cables + 6)
+        self.free = np.arange(6)
+        if known_inclination:
+            self.rows = np.delete(self.rows, [cables + 3, cables + 4])
+            self.free = np.array([0, 1, 2, 5])
+
+    def at(self, position: Array, attitude: Array, tension: Array) -> _Batch:
+        found = balance(self.suspension, self.arm, position, attitude, tension)
+        slope = np.concatenate([found.pose_slope[..., self.free], found.tension_slope], -1)
+        return _Batch(position, attitude, tension, found.residual[:, self.rows], slope[:, self.rows])
+
+    def moved(self, batch: _Batch, step: Array) -> _Batch:
+        turn = np.zeros((len(step), 3))
+        turn[:, self.free[3:] - 3] = step[:, 3 : len(self.free)]
+        return self.at(
+            batch.position + step[:, :3],
+            Rotation.from_rotvec(turn).as_matrix() @ batch.attitude,
+            batch.tension + step[:, len(self.free) :],
+        )
+
+
 def _solve(
     suspension: Suspension, arm_of_mass: Array, attitude: Array, known_inclination: bool, tolerance: float
 ) -> list[tuple[Array, Array, Array, float]]:
     """Levenberg-Marquardt on every start at once; returns the distinct solutions."""
+    system = _System(suspension, arm_of_mass, known_inclination)
     cables = len(suspension.length)
-    rows = np.arange(cables + 6)
-    free = np.arange(6)
-    if known_inclination:
-        rows = np.delete(rows, [cables + 3, cables + 4])
-        free = np.array([0, 1, 2, 5])
-    position = _below_the_ceiling(suspension, attitude)
-    tension = np.full((len(attitude), cables), 1.0 / cables)
-
-    def evaluate(p: Array, a: Array, t: Array) -> tuple[Array, Array]:
-        at = balance(suspension, arm_of_mass, p, a, t)
-        slope = np.concatenate([at.pose_slope[..., free], at.tension_slope], -1)
-        return at.residual[:, rows], slope[:, rows]
-
-    residual, slope = evaluate(position, attitude, tension)
-    cost = np.sum(residual**2, -1)
-    damping = np.full(len(cost), 1e-3)
+    even = np.full((len(attitude), cables), 1.0 / cables)
+    batch = system.at(_below_the_ceiling(suspension, attitude), attitude, even)
+    damping = np.full(len(attitude), 1e-3)
     for _ in range(ITERATIONS):
-        step = _damped_step(residual, slope, damping)
-        turn = np.zeros((len(cost), 3))
-        turn[:, free[3:] - 3] = step[:, 3 : len(free)]
-        trial = (
-            position + step[:, :3],
-            Rotation.from_rotvec(turn).as_matrix() @ attitude,
-            tension + step[:, len(free) :],
-        )
-        new_residual, new_slope = evaluate(*trial)
-        new_cost = np.sum(new_residual**2, -1)
-        better = new_cost < cost
-        position = np.where(better[:, None], trial[0], position)
-        attitude = np.where(better[:, None, None], trial[1], attitude)
-        tension = np.where(better[:, None], trial[2], tension)
-        residual = np.where(better[:, None], new_residual, residual)
-        slope = np.where(better[:, None, None], new_slope, slope)
+        step = _damped_step(batch.residual, batch.slope, damping)
+        trial = system.moved(batch, step)
+        better = trial.cost < batch.cost
+        batch = trial.chosen(better, batch)
         damping = np.clip(np.where(better, 0.2 * damping, 5.0 * damping), 1e-15, 1e6)
         settled = np.abs(step).max(-1) < 1e-13
-        cost = np.where(better, new_cost, cost)
-        if np.all((cost < EXACT**2 * 1e-4) | settled | (damping >= 1e6)):
+        if np.all((batch.cost < EXACT**2 * 1e-4) | settled | (damping >= 1e6)):
             break
-    misfit = np.abs(residual).max(-1)
+    misfit = np.abs(batch.residual).max(-1)
     good = np.flatnonzero(misfit < tolerance)
     order = good[np.argsort(misfit[good])]
-    return _distinct([(position[k], attitude[k], tension[k], float(misfit[k])) for k in order])
+    return _distinct(
+        [(batch.position[k], batch.attitude[k], batch.tension[k], float(misfit[k])) for k in order]
+    )
 
 
 def _damped_step(residual: Array, slope: Array, damping: Array) -> Array:
