@@ -1,5 +1,6 @@
 """The tables are those of the thesis, and what they say holds together or stands in the remarks."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,7 +9,13 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from rig_identification.errors import InputError
-from rig_identification.thesis import load_case, load_cases, read_case_table, read_static_table
+from rig_identification.thesis import (
+    load_case,
+    load_cases,
+    read_case_table,
+    read_static_table,
+    read_text_remarks,
+)
 from rig_identification.thesis.estimators import fit_euler_predictor, fit_momentum
 from rig_identification.thesis.tables import fingerprint
 
@@ -245,6 +252,23 @@ def test_force_program_follows_the_table():
     turning = load_case(14).force(np.linspace(0.0, 3.0, 50))
     assert np.linalg.norm(turning, axis=1) == pytest.approx(200.0)
     assert turning[0] == pytest.approx([0.0, 200.0, 0.0])
+
+
+def test_force_along_world_axes_is_turned_into_the_body():
+    program = load_case(14).force
+    half_turn = np.tile([0.0, 0.0, 1.0, 0.0], (5, 1))
+    time = np.linspace(0.0, 1.0, 5)
+    assert program.in_body(time, half_turn)[:, :2] == pytest.approx(-program(time)[:, :2], abs=1e-9)
+    along_body = replace(program, axes="body")
+    assert np.array_equal(along_body.in_body(time, half_turn), program(time))
+
+
+def test_text_remarks_hold_what_the_printed_numbers_show():
+    """The section on case 15 against 14 and the count of vehicles can be read off the tables."""
+    where = " ".join(place for place, _ in read_text_remarks())
+    assert "equation 3.11" in where
+    assert load_case(15).published.error[0, 0] < load_case(14).published.error[0, 0]
+    assert len({load_case(n).mass for n in range(10, 18)}) == 4
 
 
 def test_variants_of_case_18():

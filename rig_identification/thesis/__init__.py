@@ -2,7 +2,12 @@
 
 from rig_identification.thesis.case import Case, Published, load_case, load_cases
 from rig_identification.thesis.force import ForceProgram, HarmonicForce, StepForce
-from rig_identification.thesis.tables import CASE_NUMBERS, read_case_table, read_static_table
+from rig_identification.thesis.tables import (
+    CASE_NUMBERS,
+    read_case_table,
+    read_static_table,
+    read_text_remarks,
+)
 
 __all__ = [
     "CASE_NUMBERS",
@@ -15,4 +20,5 @@ __all__ = [
     "load_cases",
     "read_case_table",
     "read_static_table",
+    "read_text_remarks",
 ]

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,13 @@ class ForceProgram:
             acts = (instants >= segment.start) & (instants < segment.end)
             total[acts] += segment.force(instants[acts])
         return total
+
+    def in_body(self, time: Array, orientation: Array) -> Array:
+        """(n, 3) N along body axes at (n,) s; ``orientation`` (n, 4) xyzw rotates body vectors into world."""
+        force = self(time)
+        return (
+            force if self.axes == "body" else np.asarray(Rotation.from_quat(orientation).inv().apply(force))
+        )
 
     @property
     def breaks(self) -> tuple[float, ...]:

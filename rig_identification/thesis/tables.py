@@ -42,6 +42,11 @@ def read_static_table() -> dict[str, Any]:
     return _read("table_2_1.yaml")
 
 
+def read_text_remarks() -> tuple[tuple[str, str], ...]:
+    """Return (where, remark) for every inconsistency found in the thesis' text and equations."""
+    return tuple((entry["where"], entry["remark"].strip()) for entry in _read("text.yaml")["remarks"])
+
+
 def fingerprint(table: dict[str, Any]) -> str:
     """Return the SHA-256 of the numbers as typed: ``printed`` and ``published``, keys sorted."""
     typed = {key: table[key] for key in ("printed", "published") if key in table}
