@@ -10,6 +10,7 @@ from rig_identification.errors import InputError
 from rig_identification.recording import Dummy
 from rig_identification.rig import Cable, CarryingFrame, Rig
 from rig_identification.statics import (
+    StaticObservation,
     find_equilibria,
     observe_equilibrium,
     solve_center_of_mass,
@@ -139,6 +140,46 @@ def test_parallel_cables_with_load_cells_determine_all_but_the_height():
     assert solution.undetermined == ("cz",)
     assert solution.center_of_mass[:2] == pytest.approx(center[:2], abs=2e-3)
     assert np.all(solution.std[:2] < 5e-3)
+
+
+def hexagon():
+    """Six rigid cables in pairs: they lock the body, and each carries what statics says."""
+    angle = np.arange(6) * np.pi / 3.0
+    body = np.c_[np.cos(angle), np.sin(angle), np.zeros(6)]
+    twist = 0.25 * np.array([1.0, -1.0] * 3)
+    ceiling = np.c_[1.5 * np.cos(angle + twist), 1.5 * np.sin(angle + twist), np.full(6, 2.0)]
+    length = np.linalg.norm(ceiling - body, axis=1)
+    cables = tuple(Cable(f"c{i}", ceiling[i], body[i], float(length[i])) for i in range(6))
+    return Rig(9.81, cables, mass=600.0), (ceiling - body) / length[:, None], body
+
+
+def test_six_cables_lock_the_pose_so_that_only_load_cells_tell_and_never_the_height():
+    rig, unit, body = hexagon()
+    center = np.array([0.05, 0.08, -0.3])
+    wrench = np.hstack([unit, np.cross(body, unit)]).T
+    seen = []
+    for name, load in (("bare", None), ("dummy", Dummy(40.0, np.array([0.3, -0.2, 0.1])))):
+        total = rig.mass + (load.mass if load else 0.0)
+        first = rig.mass * center + (load.mass * load.position if load else 0.0)
+        weight = np.array([0.0, 0.0, -total * 9.81])
+        pull = np.linalg.solve(wrench, -np.concatenate([weight, np.cross(first / total, weight)]))
+        assert np.all(pull > 0.0)
+        seen.append(StaticObservation(name, np.zeros(2), np.full(2, 1e-5), pull, np.full(6, 0.1), load))
+    solution = solve_center_of_mass(rig, *seen)
+    assert solution.undetermined == ("cz",)
+    assert np.abs(solution.center_of_mass - center)[:2].max() < 3e-3
+    assert np.all(solution.std[:2] < 0.02)
+
+
+def test_load_cells_stand_in_for_a_missing_inclinometer():
+    case = load_case(14)
+    dummy = Dummy(80.0, np.array([0.1, 0.2, -0.4]))
+    seen = observe_both(case.rig, case.rig, case.mass, case.center_of_mass, dummy, 0.1)
+    blind = [replace(o, inclination=np.full(2, np.nan), inclination_std=np.full(2, np.nan)) for o in seen]
+    solution = solve_center_of_mass(case.rig, *blind)
+    assert solution.status == "determined"
+    assert solution.center_of_mass == pytest.approx(case.center_of_mass, abs=1e-5)
+    assert np.all(solution.std > solve_center_of_mass(case.rig, *seen).std)
 
 
 def test_unknown_mass_comes_from_the_load_cells():
