@@ -33,7 +33,17 @@ def read_rig(file: Path) -> Rig:
     InputError
         The first fault, as one line with file, key path, value and limit.
     """
-    top = _parameters(load_fields(file, "rig description"))
+    return rig_from_fields(_parameters(load_fields(file, "rig description")))
+
+
+def rig_from_fields(top: Fields) -> Rig:
+    """Validate the parameters of a rig description, wherever they were read.
+
+    Raises
+    ------
+    InputError
+        The first fault, as for :func:`read_rig`.
+    """
     top.refuse_misspelt(_TOP_KEYS)
     cables = tuple(_cable(top, name) for name in _cable_names(top))
     _check_distinct_hinges(top, cables)
