@@ -25,7 +25,7 @@ class AirDrag(Effect):
     @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> AirDrag:
         """Speeds are decimetres a second: only large areas are felt."""
-        return cls(log_size(size, 0.3, 40.0), scene.body.center_of_mass)
+        return cls(log_size(size, 2.0, 60.0), scene.body.center_of_mass)
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""

@@ -39,12 +39,12 @@ class CableMass(Effect):
     def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
         """See :class:`Effect`."""
         origin = level_origin(scene)
+        # A yielding ceiling carries the rods, if there is one.
+        ceiling = spec.body("plate") or spec.worldbody
         for i, length in enumerate(scene.geometry.length):
             span = origin + scene.geometry.hinge[i] - scene.geometry.ceiling[i]
             mass = self.linear_density * length
-            rod = spec.worldbody.add_body(
-                name=f"rod_{i}", pos=scene.geometry.ceiling[i], quat=_z_along(-span)
-            )
+            rod = ceiling.add_body(name=f"rod_{i}", pos=scene.geometry.ceiling[i], quat=_z_along(-span))
             rod.explicitinertial = True
             rod.mass, rod.ipos = mass, [0.0, 0.0, -0.5 * length]
             across = mass * length**2 / 12.0
