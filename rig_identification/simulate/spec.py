@@ -1,0 +1,74 @@
+"""What is to be simulated: a body on a rig, its programme of motion, and the devices that watch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.recording import Dummy
+from rig_identification.rig import Mount, Rig
+from rig_identification.simulate.exciter import ForceProgram
+from rig_identification.simulate.start import AtRest, Start
+
+Array = NDArray[np.float64]
+
+#: A motion-capture system that stands somewhere in the room, turned by 23 degrees.
+TRACKER = Mount(np.array([1.2, -0.4, 0.1]), np.array([0.0, 0.0, np.sin(0.2), np.cos(0.2)]))
+
+
+@dataclass(frozen=True)
+class SampleRates:
+    """Rate of each device, Hz; 0: not there. A device that the rig does not mount is not there either."""
+
+    tension: float = 500.0
+    exciter: float = 500.0
+    shaft: float = 100.0  # of the exciter; only where its program turns a shaft
+    imu: float = 200.0
+    inclinometer: float = 50.0
+    mocap: float = 0.0
+    ground_truth: float = 100.0
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """One dynamic recording."""
+
+    name: str
+    duration: float  # s
+    start: Start = field(default_factory=AtRest)
+    force: ForceProgram | None = None  # None: the body swings freely
+    holdout: bool = False
+
+
+@dataclass(frozen=True)
+class StaticSpec:
+    """One recording of the body at rest."""
+
+    name: str
+    duration: float  # s
+    dummy: Dummy | None = None
+
+
+@dataclass(frozen=True)
+class SessionSpec:
+    """One session.
+
+    ``noise``: every sample has the noise of ``rig.noise``. ``doubts``: the true rig is drawn
+    about the description, each quantity by its tolerance (normal, cut at three tolerances:
+    what lies beyond would be a finding), and the scale's reading about the true mass.
+    ``rods``: the cables push as well.
+    """
+
+    name: str
+    rig: Rig  # what the lab believes
+    elements: Array  # (10,) the body: m, c, J about the centre of mass (model/body.py)
+    runs: tuple[RunSpec, ...] = ()
+    statics: tuple[StaticSpec, ...] = ()
+    rates: SampleRates = field(default_factory=SampleRates)
+    noise: bool = True
+    doubts: bool = True
+    rods: bool = False
+    world_in_tracker: Mount = field(default_factory=lambda: TRACKER)
+    start_ns: int = 1_790_000_000_000_000_000  # stamp at which the first recording starts

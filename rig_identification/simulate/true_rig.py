@@ -1,0 +1,75 @@
+"""The rig as it is: the description with every doubt about it drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.stats import truncnorm
+
+from rig_identification.estimate.parameters import INERTIAL, UNKNOWN_ROTATION, ParameterSet, parameter_set
+from rig_identification.model import layout
+from rig_identification.model.motion import RigModel, rig_model
+from rig_identification.rig import Rig
+from rig_identification.simulate.spec import SessionSpec
+
+Array = NDArray[np.float64]
+
+#: Doubts are cut at so many tolerances: what lies beyond would be a finding.
+CUT = 3.0
+
+
+@dataclass(frozen=True)
+class TrueRig:
+    """Numbers that motion and readings come from, under the names that the estimator gives them."""
+
+    model: RigModel
+    device: Array  # the devices' own numbers (estimate/parameters.py, DeviceLayout)
+    parameters: ParameterSet
+    values: dict[str, float]  # parameter name -> true value
+    described: Rig  # description, with the scale's reading of the mass
+
+    def late(self, device: str) -> float:
+        """By how much the stamps of a device are late, s."""
+        entry = self.parameters.places.clock(device)
+        return 0.0 if entry is None else float(self.device[entry])
+
+    @property
+    def R_body_exciter(self) -> Array:
+        """(3, 3) true orientation of the exciter frame."""
+        error = self.model.physics[layout.EXCITER_ROTATION : layout.EXCITER_ROTATION + 3]
+        return np.asarray(Rotation.from_rotvec(error).as_matrix() @ self.model.exciter_orientation)
+
+
+def channels_of(spec: SessionSpec) -> set[str]:
+    """Devices that record: cable names, imu, inclinometer, mocap."""
+    rates, rig = spec.rates, spec.rig
+    found = {cable.name for cable in rig.cables} if rates.tension > 0.0 else set()
+    if rates.imu > 0.0 and rig.imu is not None:
+        found.add("imu")
+    if rates.inclinometer > 0.0 and rig.inclinometer is not None:
+        found.add("inclinometer")
+    if rates.mocap > 0.0:
+        found.add("mocap")
+    return found
+
+
+def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
+    """The true rig of a session; the description itself where ``spec.doubts`` is off."""
+    model = rig_model(spec.rig, spec.elements, rods=spec.rods)
+    parameters = parameter_set(spec.rig, model, channels_of(spec))
+    theta = parameters.start(spec.elements)
+    described = spec.rig
+    if spec.doubts:
+        drawn = truncnorm.rvs(-CUT, CUT, size=len(parameters.free), random_state=rng)
+        # A mount that no one described is not a doubt: it stays where the simulation puts it
+        known = np.array([p.prior_std < UNKNOWN_ROTATION or p.unit == "N" for p in parameters.free])
+        theta[INERTIAL:] = np.where(known, drawn, 0.0)
+        if described.mass is not None and described.mass_std is not None:
+            reading = float(spec.elements[0]) + described.mass_std * float(rng.standard_normal())
+            described = replace(described, mass=reading)
+    values = {p.name: float(v) for p, v in zip(parameters.free, parameters.values(theta), strict=True)}
+    true = model.with_physics(parameters.physics(theta))
+    return TrueRig(true, parameters.device(theta), parameters, values, described)
