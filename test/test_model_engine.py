@@ -58,7 +58,7 @@ def tolerances(rig: Rig) -> dict[int, float]:
 
 
 def errors(model: RigModel, first: State, drive: Input, entries: Array, values: Array) -> tuple[Array, Array]:
-    """(9 N,) position m, attitude rad and rate rad/s of the engine less the model, and the model's derivative."""
+    """(N, 9) position m, attitude rad, rate rad/s: engine less model; (N, 9, d) the model's derivative."""
     motion = simulate(model, on_cables(model, first), drive, directions=entries)
     assert motion.complete
     assert motion.J is not None
@@ -72,7 +72,7 @@ def errors(model: RigModel, first: State, drive: Input, entries: Array, values: 
 
 @pytest.mark.parametrize("run", ["run_1", "run_2"])
 def test_motion_of_the_engine_lies_within_the_tolerances(run: str) -> None:
-    """As described, the rig's motion errs by what its tolerances allow; some rig within them gives the engine's."""
+    """As described, the rig errs by what its tolerances allow; some rig within them moves as the engine."""
     session = read_session(SESSION)
     truth = json.loads((SESSION / "truth.json").read_text())
     recording = next(r for r in session.recordings if r.name == run)
@@ -110,4 +110,4 @@ def test_motion_of_the_engine_lies_within_the_tolerances(run: str) -> None:
     worst = np.max(np.abs(apart), axis=0)
     assert np.max(worst[:3]) < 1e-4
     assert np.max(worst[3:6]) < 1e-4
-    assert np.max(worst[6:]) < 5e-4
+    assert np.max(worst[6:]) < 1e-3

@@ -93,7 +93,7 @@ def test_imu_feels_the_acceleration_of_its_own_origin() -> None:
     reading = sensors.imu(motion.outputs, position, turn.as_matrix(), np.zeros(sensors.IMU_SIZE))
     path = motion.states[:, :3] + motion.R_world_body @ position
     acceleration = np.gradient(np.gradient(path, step, axis=0, edge_order=2), step, axis=0, edge_order=2)
-    felt = np.einsum("nji,nj->ni", motion.R_world_body, acceleration + [0.0, 0.0, 9.80665])
+    felt = np.einsum("nji,nj->ni", motion.R_world_body, acceleration + np.array([0.0, 0.0, 9.80665]))
     np.testing.assert_allclose(reading.values[5:-5, 3:], turn.inv().apply(felt)[5:-5], atol=1e-4)
     np.testing.assert_allclose(reading.values[:, :3], turn.inv().apply(motion.outputs[:, 6:9]), atol=1e-12)
 
