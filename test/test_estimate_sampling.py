@@ -1,0 +1,110 @@
+"""From nodes to samples and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from rig_identification.estimate.sampling import (
+    Grid,
+    group_by_node,
+    interpolation,
+    node_values,
+    rate_of_change,
+    white_noise_std,
+)
+
+GRID = Grid(0.01, 201)
+COEFFICIENTS = arrays(float, 4, elements=st.floats(-3.0, 3.0))
+
+
+def nodes() -> np.ndarray:
+    return GRID.step * np.arange(GRID.nodes)
+
+
+@given(COEFFICIENTS, arrays(float, 25, elements=st.floats(0.0, 2.0)))
+def test_cubics_are_interpolated_exactly(c: np.ndarray, time: np.ndarray) -> None:
+    polynomial = np.polynomial.Polynomial(c)
+    value, slope = interpolation(GRID, time, np.arange(25), 25)
+    np.testing.assert_allclose(value @ polynomial(nodes()), polynomial(time), atol=1e-11)
+    np.testing.assert_allclose(slope @ polynomial(nodes()), polynomial.deriv()(time), atol=1e-8)
+
+
+def test_samples_on_nodes_are_the_nodes() -> None:
+    values = np.random.default_rng(0).normal(size=GRID.nodes)
+    value, _ = interpolation(GRID, nodes(), np.arange(GRID.nodes), GRID.nodes)
+    np.testing.assert_allclose(value @ values, values, atol=1e-12)
+
+
+def test_interpolation_error_is_of_fourth_order() -> None:
+    time = np.random.default_rng(1).uniform(0.1, 1.9, 500)
+    errors = []
+    for step in (0.02, 0.01):
+        grid = Grid(step, round(2.0 / step) + 1)
+        value, _ = interpolation(grid, time, np.arange(500), 500)
+        at = step * np.arange(grid.nodes)
+        errors.append(np.max(np.abs(value @ np.sin(9.0 * at) - np.sin(9.0 * time))))
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.2)
+
+
+@given(st.integers(0, 1000), st.floats(100.0, 2000.0))
+def test_groups_hold_the_samples_nearest_their_node(seed: int, rate: float) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.sort(rng.uniform(0.0, GRID.duration, int(rate)))
+    group, node = group_by_node(GRID, time)
+    assert np.all(np.diff(node) > 0)
+    assert np.all(np.bincount(group, minlength=node.size) > 0)
+    assert np.max(np.abs(time - GRID.step * node[group])) <= 0.5 * GRID.step * (1.0 + 1e-9)
+    # Mean over the group of the interpolated values, and of the samples: the same linear map
+    value, _ = interpolation(GRID, time, group, node.size)
+    expected = np.bincount(group, time) / np.bincount(group)
+    np.testing.assert_allclose(value @ nodes(), expected, atol=1e-12)
+    np.testing.assert_allclose(value @ np.ones(GRID.nodes), 1.0, atol=1e-12)
+
+
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.integers(0, 1000))
+def test_straight_lines_go_through_node_values_even_across_a_gap(a: float, b: float, seed: int) -> None:
+    time = np.sort(np.random.default_rng(seed).uniform(0.0, GRID.duration, 900))
+    time = time[(time < 0.7) | (time > 0.9)]
+    fitted = node_values(GRID, time, (a + b * time)[:, None])
+    np.testing.assert_allclose(fitted[:, 0], a + b * nodes(), atol=1e-8)
+
+
+def test_node_values_keep_the_motion_and_average_the_noise() -> None:
+    rng = np.random.default_rng(5)
+    grid = Grid(0.005, 4001)
+    at = grid.step * np.arange(grid.nodes)
+    time = np.arange(0.0, grid.duration, 0.001) + 0.0003
+
+    def force(t: np.ndarray) -> np.ndarray:
+        return np.stack([np.sin(2.0 * np.pi * 2.0 * t), np.cos(2.0 * np.pi * 0.9 * t)], axis=1)
+
+    clean = node_values(grid, time, force(time))
+    assert np.max(np.abs(clean - force(at))[5:-5]) < 5e-4
+    noise = rng.normal(size=(time.size, 2))
+    noisy = node_values(grid, time, noise)
+    # Five samples an interval: as much noise in every low frequency as the samples have
+    kernel = np.ones(200) / 200.0
+    low = np.convolve(noisy[:, 0], kernel, "valid")[::200]
+    assert np.std(low) == pytest.approx(1.0 / np.sqrt(1000.0), rel=0.4)
+    np.testing.assert_allclose(node_values(grid, time, force(time) + noise), clean + noisy, atol=1e-10)
+
+
+def test_rate_of_change_of_a_swing() -> None:
+    grid = Grid(0.005, 2001)
+    at = grid.step * np.arange(grid.nodes)[:, None]
+    rate = rate_of_change(grid, np.sin(2.0 * np.pi * 1.0 * at))
+    expected = 2.0 * np.pi * np.cos(2.0 * np.pi * at)
+    np.testing.assert_allclose(rate[20:-20], expected[20:-20], atol=0.01 * 2.0 * np.pi)
+
+
+@pytest.mark.parametrize("std", [1e-4, 0.5, 20.0])
+def test_white_noise_is_told_from_motion(std: float) -> None:
+    rng = np.random.default_rng(2)
+    time = 0.005 * np.arange(4000)
+    motion = 500.0 * std * np.sin(2.0 * np.pi * 0.7 * time)
+    found = white_noise_std((motion + std * rng.normal(size=time.size))[:, None])
+    assert found[0] == pytest.approx(std, rel=0.06)
