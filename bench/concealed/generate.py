@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from bench.concealed import truth as truths
 from bench.concealed.draw import draw_scene, scaled
-from bench.concealed.effects import draw_effects
+from bench.concealed.effects import choose, draw_effects
 from bench.concealed.effects.base import Effect
+from bench.concealed.effects.place import released_aside
 from bench.concealed.engine import Engine
 from bench.concealed.measure import device_samples, record
 from bench.concealed.scene import Plan, Scene
@@ -38,8 +39,13 @@ def make_session(
     ``size``: 0 (faint) to 1 (strong); None draws it. ``duration`` of each run in s.
     The same arguments give the same session, bit for bit, on the same machine.
     """
-    ideal, paths = _calm_scene(draw_scene(seed, duration))
-    effects = draw_effects(np.random.default_rng([seed, 3]), ideal, kind, size)
+    rng = np.random.default_rng([seed, 3])
+    chosen = choose(rng, kind)
+    ideal = draw_scene(seed, duration)
+    if any(e.aside for e in chosen):
+        ideal = released_aside(ideal)
+    ideal, paths = _calm_scene(ideal)
+    effects = draw_effects(rng, chosen, ideal, size)
     scene, altered, effects = _with_effects(ideal, paths, effects)
     with_shaft = bool(np.random.default_rng([seed, 4]).random() < 0.5)
     recordings = tuple(
@@ -48,6 +54,9 @@ def make_session(
     )
     session = Session(f"concealed_{seed}", scene.rig, recordings)
     truth = truths.describe(scene, effects, altered)
+    if scene.plans is not ideal.plans:  # the effect asks for other runs: compare the same ones
+        ideal = replace(ideal, plans=scene.plans)
+        paths = simulate(ideal, [])
     truth["effect_over_noise"] = effect_over_noise(ideal, paths, scene, altered, effects)
     return session, truth
 

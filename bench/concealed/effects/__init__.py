@@ -24,8 +24,8 @@ CATALOGUE = {name: effect for name, effect in _ALL.items() if not effect.outside
 OUTSIDE = {name: effect for name, effect in _ALL.items() if effect.outside}
 
 
-def draw_effects(rng: np.random.Generator, scene: Scene, kind: str, size: float | None) -> list[Effect]:
-    """The effects that ``kind`` asks for, of random place and, if ``size`` is None, of random size.
+def choose(rng: np.random.Generator, kind: str) -> list[type[Effect]]:
+    """The effects that ``kind`` asks for.
 
     ``kind``: "clean", "single", "pair", "outside", "random", an effect's name, or several joined by "+".
     """
@@ -33,8 +33,15 @@ def draw_effects(rng: np.random.Generator, scene: Scene, kind: str, size: float 
     unknown = [n for n in names if n not in _ALL]
     if unknown:
         raise ValueError(f"no effect {unknown[0]!r}: choose from {', '.join(_ALL)}")
-    sizes = [float(rng.uniform()) if size is None else size for _ in names]
-    return [_ALL[n].draw(rng, scene, s) for n, s in zip(names, sizes, strict=True)]
+    return [_ALL[n] for n in names]
+
+
+def draw_effects(
+    rng: np.random.Generator, chosen: list[type[Effect]], scene: Scene, size: float | None
+) -> list[Effect]:
+    """The chosen effects, of random place and, if ``size`` is None, of random size."""
+    sizes = [float(rng.uniform()) if size is None else size for _ in chosen]
+    return [effect.draw(rng, scene, s) for effect, s in zip(chosen, sizes, strict=True)]
 
 
 def _names(rng: np.random.Generator, kind: str) -> list[str]:

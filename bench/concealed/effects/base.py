@@ -42,6 +42,7 @@ class Effect:
     outside = False  # not in the contract's table
     near: tuple[str, ...] = ()  # from outside: words of the table that a fair judge might let pass
     mechanical = False  # the motion changes, not only what is read
+    aside = False  # the body must be released from rest under a pull: from the level pose it would bounce
     own_cables = False  # the effect replaces the rigid cables by its own
 
     @classmethod

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
-from bench.concealed.effects.place import released_aside
 from bench.concealed.scene import Array, Plan, Scene
 
 
@@ -21,6 +20,7 @@ class CableElasticity(Effect):
 
     name = "cable_elasticity"
     mechanical = True
+    aside = True
     own_cables = True
     axial_stiffness: float  # N
     damping_ratio: float  # 1
@@ -37,10 +37,6 @@ class CableElasticity(Effect):
             "damping_ratio": quantity(self.damping_ratio, "1"),
         }
         return {"parameters": parameters}
-
-    def alter(self, scene: Scene) -> Scene:
-        """A body on springs is released from rest aside: from the level pose it would drop and bounce."""
-        return released_aside(scene)
 
     def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
         """See :class:`Effect`."""

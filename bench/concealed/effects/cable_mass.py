@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
-from bench.concealed.effects.place import level_origin, released_aside
+from bench.concealed.effects.place import level_origin
 from bench.concealed.mechanism import CONSTRAINT_TIME, IMPEDANCE
 from bench.concealed.scene import Array, Plan, Scene
 
@@ -20,6 +20,7 @@ class CableMass(Effect):
 
     name = "cable_mass"
     mechanical = True
+    aside = True
     own_cables = True
     linear_density: float  # kg/m
 
@@ -31,10 +32,6 @@ class CableMass(Effect):
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         return {"parameters": {"linear_density": quantity(self.linear_density, "kg/m")}}
-
-    def alter(self, scene: Scene) -> Scene:
-        """Rods find their direction while the body comes to rest: no release from the level pose."""
-        return released_aside(scene)
 
     def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
         """See :class:`Effect`."""

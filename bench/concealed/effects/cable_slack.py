@@ -16,6 +16,7 @@ from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
 LEAST_SLACK = 0.02  # s, of one cable over the session
+GRAZE = 0.003  # s: shorter than that a cable was never loose
 REBOUND = 0.2  # s: a cable that snaps tight bounces; that is one spell
 
 
@@ -73,9 +74,10 @@ class CableSlack(Effect):
             slack = path.tension < 1.0
             slack_time += path.time[1] * slack.sum(axis=0)
             for first, last in _spells(path.time[slack.any(axis=1)] - plan.first_sample):
-                if last > 0.0:
+                if last > 0.0 and last - first > GRAZE:
                     times.append({"recording": plan.name, "start": max(first, 0.0), "end": last})
-        if slack_time.max() < LEAST_SLACK:
+        # A fit must see it in the run that it is fitted to.
+        if slack_time.max() < LEAST_SLACK or all(t["recording"] != "run_1" for t in times):
             return None
         return {"channel": f"cable_{int(np.argmax(slack_time)) + 1}", "times": times}
 

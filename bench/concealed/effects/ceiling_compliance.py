@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
-from bench.concealed.effects.place import released_aside
 from bench.concealed.mechanism import give_mass
 from bench.concealed.scene import Scene
 
@@ -23,6 +22,7 @@ class CeilingCompliance(Effect):
 
     name = "ceiling_compliance"
     mechanical = True
+    aside = True
     axis: int
     stiffness: float  # N/m
     mass: float  # kg
@@ -42,10 +42,6 @@ class CeilingCompliance(Effect):
             "damping_ratio": quantity(self.damping_ratio, "1"),
         }
         return {"where": {"channel": "ceiling", "axis": "xyz"[self.axis]}, "parameters": parameters}
-
-    def alter(self, scene: Scene) -> Scene:
-        """See :class:`Effect`."""
-        return released_aside(scene)
 
     def ceiling(self, spec: Any, scene: Scene) -> Any:
         """See :class:`Effect`."""

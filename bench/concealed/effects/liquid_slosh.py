@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
-from bench.concealed.effects.place import released_aside, tank
+from bench.concealed.effects.place import tank
 from bench.concealed.inertia import add_point
 from bench.concealed.mechanism import give_mass
 from bench.concealed.scene import Array, Body, Plan, Scene
@@ -21,6 +21,7 @@ class LiquidSlosh(Effect):
 
     name = "liquid_slosh"
     mechanical = True
+    aside = True
     mass: float  # kg
     frequency: float  # Hz
     damping_ratio: float  # 1
@@ -42,10 +43,6 @@ class LiquidSlosh(Effect):
             "damping_ratio": quantity(self.damping_ratio, "1"),
         }
         return {"where": {"position": self.position.tolist()}, "parameters": parameters}
-
-    def alter(self, scene: Scene) -> Scene:
-        """See :class:`Effect`."""
-        return released_aside(scene)
 
     def rigid_part(self, body: Body) -> Body:
         """See :class:`Effect`."""
