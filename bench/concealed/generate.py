@@ -25,6 +25,7 @@ from rig_identification.recording import Session
 
 LEAST_TENSION = 0.02  # of the weight: clean scenes stay clear of slack cables by this
 MOST_RATE = 0.8  # rad/s
+MOST_STRETCH = 1e-6  # m: faster motion asks more of the engine's rigid cables
 START_ACCURACY = 1e-4  # m/s^2 or rad/s^2, m from the level pose
 PROBE = 8.0  # s
 LEAST_RANGE = 0.035  # m, of the body origin
@@ -125,7 +126,8 @@ def _calm_run(scene: Scene, plan: Plan) -> tuple[Plan, Trajectory]:
 def _share(scene: Scene, path: Trajectory) -> float:
     """By what to scale a run: 1 if it is good as it is."""
     weight = scene.body.mass * scene.rig.gravity
-    if path.tension.min() < LEAST_TENSION * weight or np.abs(path.rate).max() > MOST_RATE:
+    rigid = np.abs(path.stretch).max() < MOST_STRETCH
+    if not rigid or path.tension.min() < LEAST_TENSION * weight or np.abs(path.rate).max() > MOST_RATE:
         return 0.6
     # Enough motion to tell an inertia.
     return 1.0 if np.ptp(path.position, axis=0).max() > LEAST_RANGE else 1.5
