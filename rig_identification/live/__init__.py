@@ -1,0 +1,1 @@
+"""What runs while data comes in: gates, tracker, wrench and running estimate, free of ROS."""

@@ -1,0 +1,107 @@
+"""``preprocessor``: the generalized wrench about the centre of mass, in body axes."""
+
+from __future__ import annotations
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import InertiaStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
+
+from rig_identification.estimate.first_guess import first_elements
+from rig_identification.live.common_time import CommonTime
+from rig_identification.live.generalized_wrench import generalized_wrench
+from rig_identification.live.stamp_gate import StampGate
+from rig_identification.nodes.intake import Intake
+from rig_identification.nodes.odometry_wire import read_odometry
+from rig_identification.nodes.parameters import OwnParameter, within
+from rig_identification.nodes.rig_node import LATCHED, OK, WARN, RigNode, diagnostic, reliable
+from rig_identification.nodes.wire import StampedDoubles
+from rig_identification.recording import Session
+from rig_identification.session.topics import expected_topics
+
+PARAMETERS = (
+    OwnParameter(
+        "center_of_mass", [0.0], "m, body frame; one number: the identifier's latest, before it a guess"
+    ),
+    OwnParameter("include_weight", True, "gravity is part of the force"),
+    OwnParameter("period", 0.01, "s between looks at what arrived", within(0.001, 0.5, "s")),
+    OwnParameter("depth", 1000, "messages kept of each topic: a second of the fastest", within(10, 100_000)),
+)
+_POSE, _EXCITER = "pose", "exciter"
+
+
+class PreprocessorNode(RigNode):
+    """Brings tensions, exciter force and pose to common instants and publishes the wrench."""
+
+    def __init__(self) -> None:
+        super().__init__("preprocessor", PARAMETERS)
+        self._description = rig = self.rig()
+        elements = first_elements(Session("live", rig, ()))
+        self.mass, self.center = float(elements[0]), elements[1:4]
+        self.center_from = "a guess by the rig's size"
+        if self.own.vector("center_of_mass").size == 3:
+            self.center, self.center_from = self.own.vector("center_of_mass", 3), "parameter"
+        names = tuple(cable.name for cable in rig.cables)
+        used = ("tension", "exciter_force") if rig.exciter is not None else ("tension",)
+        topics = expected_topics(names, self.get_namespace())
+        depth = self.own.whole("depth")
+        self.intake = Intake(self, {n: t for n, t in topics.items() if t.channel in used}, depth)
+        widths = {_POSE: 7, **dict.fromkeys(names, 1), **({_EXCITER: 3} if rig.exciter is not None else {})}
+        self._common = CommonTime(widths)
+        self._gate = StampGate()
+        self._poses: list[bytes] = []
+        self.create_subscription(Odometry, "odometry", self._poses.append, reliable(depth), raw=True)
+        self.create_subscription(
+            InertiaStamped, "identifier/inertia", self.guarded(self._hear_inertia), LATCHED
+        )
+        self._writer = StampedDoubles(WrenchStamped(header=Header(frame_id="center_of_mass")), 6)
+        self._wrench = self.create_publisher(WrenchStamped, "generalized_wrench", reliable(depth))
+        self.published = 0
+        self.every(self.own.number("period"), self._work)
+
+    def _hear_inertia(self, message: InertiaStamped) -> None:
+        com = message.inertia.com
+        center = np.array([com.x, com.y, com.z])
+        if self.center_from != "parameter" and np.all(np.isfinite(center)):
+            self.center, self.center_from = center, "identifier"
+            if np.isfinite(message.inertia.m):
+                self.mass = message.inertia.m
+
+    def _work(self) -> None:
+        for batch in self.intake.take():
+            name = batch.topic.cable or _EXCITER
+            if len(batch.stamp_ns):
+                self._common.add(name, batch.stamp_ns, batch.values)
+        if self._poses:
+            taken = self._poses[:]
+            del self._poses[: len(taken)]
+            stamps, values = read_odometry(taken)
+            admitted = self._gate.admit(stamps, stamps)
+            if admitted.any():
+                self._common.add(_POSE, stamps[admitted], values[admitted, :7])
+        stamps, values_at = self._common.take(_POSE)
+        if not len(stamps):
+            return
+        tension = np.concatenate([values_at[cable.name] for cable in self._description.cables], axis=1)
+        force = values_at.get(_EXCITER, np.zeros((len(stamps), 3)))
+        weight = self.mass * self._description.gravity if self.own.flag("include_weight") else 0.0
+        wrench = generalized_wrench(self._description, values_at[_POSE], tension, force, self.center, weight)
+        for message in self._writer.serialize(stamps, wrench):
+            self._wrench.publish(message)
+        self.published += len(stamps)
+
+    def status(self) -> list[DiagnosticStatus]:
+        """Where the centre of mass is from, and instants without a full set of values."""
+        lost = self._common.given_up
+        line = diagnostic(
+            f"{self.get_name()}: wrench", WARN if lost else OK,
+            f"{lost} instants lack a device's value" if lost else f"centre of mass: {self.center_from}",
+            published=self.published, center_of_mass=np.round(self.center, 4).tolist(), mass=self.mass,
+        )  # fmt: skip
+        return [*super().status(), line]
+
+
+def create() -> PreprocessorNode:
+    """The node."""
+    return PreprocessorNode()

@@ -1,0 +1,120 @@
+"""What every node of the rig shares: parameters, guarded callbacks, diagnostics, one way to end."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_srvs.srv import Trigger
+
+from rig_identification.errors import RigIdentificationError
+from rig_identification.nodes.parameters import OwnParameter, OwnParameters
+from rig_identification.nodes.rig_parameters import rig_of
+from rig_identification.rig import Rig
+
+#: The latest message stays for those who come later.
+LATCHED = QoSProfile(
+    depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE
+)
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+def reliable(depth: int) -> QoSProfile:
+    """Reliable, the last ``depth`` messages kept: a second of a sensor's samples."""
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class RigNode(Node):
+    """A node that outlives its callbacks' errors and says so on ``/diagnostics``."""
+
+    def __init__(self, name: str, parameters: Sequence[OwnParameter]) -> None:
+        super().__init__(
+            name,
+            namespace=None,
+            allow_undeclared_parameters=True,
+            automatically_declare_parameters_from_overrides=True,
+        )
+        self._own_names = [p.name for p in parameters]
+        self.own = OwnParameters(self, parameters)
+        self.steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.faults = 0  # errors that callbacks raised
+        self.last_fault = ""
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.every(1.0, self._diagnose)
+
+    def rig(self) -> Rig:
+        """The rig that the parameters describe. Raises InputError."""
+        return rig_of(self, self._own_names)
+
+    def every(self, period: float, work: Callable[[], None], group: CallbackGroup | None = None) -> None:
+        """Call ``work`` each ``period`` seconds of the machine's steady clock."""
+        self.create_timer(period, self.guarded(work), clock=self.steady, callback_group=group)
+
+    def guarded(self, work: Callable[..., None]) -> Callable[..., None]:
+        """``work``, its errors logged and counted: one bad message must not end a node."""
+
+        def call(*arguments: object) -> None:
+            try:
+                work(*arguments)
+            except RigIdentificationError as error:
+                self.fault(str(error))
+            except Exception as error:
+                self.fault(f"{type(error).__name__}: {error}", traceback.format_exc())
+
+        return call
+
+    def fault(self, message: str, details: str = "") -> None:
+        """Log an error; the same one again is only counted."""
+        self.faults += 1
+        if message != self.last_fault:
+            self.get_logger().error(f"{message}\n{details}".rstrip())
+        self.last_fault = message
+
+    def serve(self, name: str, answer: Callable[[], str], group: CallbackGroup | None = None) -> None:
+        """Offer a Trigger service; ``answer`` returns the message, or raises what the caller is told."""
+
+        def call(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            _ = request
+            response.success, response.message = self.outcome(answer)
+            return response
+
+        self.create_service(Trigger, name, call, callback_group=group)
+
+    def outcome(self, answer: Callable[[], str]) -> tuple[bool, str]:
+        """(success, message) of a request."""
+        try:
+            return True, answer()
+        except RigIdentificationError as error:
+            return False, str(error)
+        except Exception as error:
+            self.fault(f"{type(error).__name__}: {error}", traceback.format_exc())
+            return False, f"defect: {type(error).__name__}: {error}"
+
+    def status(self) -> list[DiagnosticStatus]:
+        """What the node says of itself each second; nodes add to it."""
+        level, message = (
+            (OK, "running") if not self.faults else (WARN, f"{self.faults} errors: {self.last_fault}")
+        )
+        names = self.get_node_names_and_namespaces()
+        if names.count((self.get_name(), self.get_namespace())) > 1:
+            level, message = ERROR, "two nodes of this name run: end one, or rename it"
+        return [diagnostic(self.get_fully_qualified_name(), level, message)]
+
+    def _diagnose(self) -> None:
+        array = DiagnosticArray(status=self.status())
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(array)
+
+    def close(self) -> None:
+        """End what the node has begun: files, processes, threads. Called once, before it is destroyed."""
+
+
+def diagnostic(name: str, level: bytes, message: str, **values: object) -> DiagnosticStatus:
+    """One line of ``/diagnostics``."""
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    return DiagnosticStatus(level=level, name=name, message=message, hardware_id="rig", values=pairs)

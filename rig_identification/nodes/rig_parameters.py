@@ -1,0 +1,42 @@
+"""The rig description out of a node's parameters: the same checks as for the file, the same words."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+from rclpy.node import Node
+
+from rig_identification.rig import Rig
+from rig_identification.session.fields import Fields
+from rig_identification.session.rig_description import rig_from_fields
+
+#: Parameters that rclpy itself declares.
+_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+
+
+def nested_parameters(node: Node, without: Collection[str]) -> dict[str, object]:
+    """A node's parameters by the dots in their names, less those named in ``without``."""
+    tree: dict[str, object] = {}
+    for name, parameter in node.get_parameters_by_prefix("").items():
+        if name in without or name.split(".")[0] in _ROS or parameter.value is None:
+            continue
+        *path, last = name.split(".")
+        branch = tree
+        for part in path:
+            branch = branch.setdefault(part, {})  # type: ignore[assignment]
+        value = parameter.value
+        branch[last] = value if isinstance(value, str | bool | int | float) else list(value)
+    return tree
+
+
+def rig_of(node: Node, own: Collection[str]) -> Rig:
+    """The rig that a node's parameters describe.
+
+    Raises
+    ------
+    InputError
+        The first fault, with the parameter's name and value.
+    """
+    where = Path(f"parameters of {node.get_fully_qualified_name()}")
+    return rig_from_fields(Fields(where, "", nested_parameters(node, own)))

@@ -1,0 +1,46 @@
+"""The state of every incoming topic as lines of ``/diagnostics``: rate, gaps, stamps, clocks, silence."""
+
+from __future__ import annotations
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+
+from rig_identification.nodes.intake import Intake
+from rig_identification.nodes.rig_node import ERROR, OK, WARN, diagnostic
+
+#: A topic that was there and has been still for so long, s, is silent.
+SILENT = 1.0
+#: Clocks of two devices that differ by more, s, are worth a word.
+CLOCKS_APART = 0.1
+
+
+def stream_status(node: Node, intake: Intake) -> list[DiagnosticStatus]:
+    """One line a topic."""
+    offsets = [gate.offset for gate in intake.gates.values() if np.isfinite(gate.offset)]
+    reference = float(np.median(offsets)) if offsets else 0.0
+    return [_topic_status(node, intake, name, reference) for name in intake.topics]
+
+
+def _topic_status(node: Node, intake: Intake, name: str, reference: float) -> DiagnosticStatus:
+    gate = intake.gates[name]
+    if gate.received == 0:
+        return diagnostic(f"{node.get_name()}: {name}", OK, "not there")
+    level, message = OK, f"{gate.rate:.4g} Hz"
+    late = gate.offset - reference
+    publishers = node.count_publishers(name)
+    if gate.rejected or intake.not_finite[name] or intake.garbled[name]:
+        level, message = WARN, f"{gate.rejected} stamps refused, {intake.not_finite[name]} samples not finite"
+    if abs(late) > CLOCKS_APART:
+        level, message = WARN, f"clock is {late:+.3f} s off the other devices'"
+    if publishers > 1:
+        level, message = WARN, f"{publishers} publishers: end all but one"
+    if intake.silence(name) > SILENT:
+        level, message = ERROR, f"silent for {intake.silence(name):.0f} s"
+    return diagnostic(
+        f"{node.get_name()}: {name}", level, message,
+        received=gate.received, admitted=gate.admitted, rate=f"{gate.rate:.6g}",
+        gaps=gate.gaps, missing=gate.missing, duplicated=gate.duplicated, backward=gate.backward,
+        ahead=gate.ahead, zero=gate.zero, restarts=gate.restarts, not_finite=intake.not_finite[name],
+        garbled=intake.garbled[name], publishers=publishers, clock_difference=f"{late:.6f}",
+    )  # fmt: skip
