@@ -19,8 +19,21 @@ def shared(folder: str, *patterns: str) -> tuple[str, list[str]]:
     return f"share/{NAME}/{folder}", files
 
 
-# One line a ROS node, "name = rig_identification.nodes.name:main".
-NODES: list[str] = []
+# One name a ROS node: the executable, and its module in rig_identification/nodes.
+NODES = [
+    f"{name} = rig_identification.nodes.process:{name}"
+    for name in (
+        "load_cells",
+        "imu",
+        "inclinometer",
+        "tracker",
+        "preprocessor",
+        "identifier",
+        "rig_simulator",
+        "recorder",
+        "replay",
+    )
+]
 
 setup(
     name=NAME,
@@ -51,7 +64,11 @@ setup(
         "scipy>=1.11",
     ],
     extras_require={
-        "ros": [f"ros-jazzy-rclpy[fastrtps]{ROS_WHEELS}", f"ros-jazzy-common-interfaces{ROS_WHEELS}"],
+        "ros": [
+            f"ros-jazzy-rclpy[fastrtps]{ROS_WHEELS}",
+            f"ros-jazzy-common-interfaces{ROS_WHEELS}",
+            "pyserial>=3.5",
+        ],
         "test": ["hypothesis>=6.90", "pytest>=8.0", "ruff>=0.9"],
         "dev": ["mujoco>=3.1", "mypy>=1.10", "ruff>=0.9"],
     },

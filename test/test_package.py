@@ -20,7 +20,7 @@ PACKAGE = ROOT / "rig_identification"
 NAME = "rig_identification"
 
 VALUES = {"", "errors", "rig", "recording", "result"}
-CORE = {"model", "estimate", "mismatch", "statics"}
+CORE = {"model", "estimate", "mismatch", "statics", "live"}
 # What a room may import of the package besides itself and the shared values; the front door may import all.
 ALLOWED = {
     "model": set(),
@@ -31,7 +31,8 @@ ALLOWED = {
     "simulate": CORE | {"thesis"},
     "session": set(),
     "report": CORE,
-    "nodes": CORE | {"session"},
+    "live": {"model", "statics", "estimate"},
+    "nodes": CORE | {"session", "report"},
 }
 OUTSIDE_THE_CORE = {
     "argparse",

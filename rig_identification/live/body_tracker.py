@@ -196,7 +196,7 @@ class BodyTracker:
             )
 
     def _pose_covariance(self, R: Array, P: Array) -> Array:
-        """(n, 6, 6) of the datum: the IMU's position less its arm; what the lab believes of lengths is no noise."""
+        """(n, 6, 6) of the datum; what the lab believes of lengths does not average out."""
         J = np.zeros((len(R), 6, strapdown.ERRORS))
         J[:, :3, 0:3] = np.eye(3)
         J[:, :3, 3:6] = R @ self._arm

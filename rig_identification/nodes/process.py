@@ -46,7 +46,7 @@ def take_signals() -> StopRequest:
 
 
 def run(module: str, arguments: list[str] | None = None) -> int:
-    """Run the node of ``rig_identification.nodes.<module>`` until a signal; exit status 0, or 2 for bad input."""
+    """Run the node in ``<module>.py`` until a signal; exit status 0, or 2 for bad input."""
     stop = take_signals()
     node_module = importlib.import_module(f"rig_identification.nodes.{module}")
     spinning = importlib.import_module("rig_identification.nodes.spinning")

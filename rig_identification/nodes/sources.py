@@ -32,7 +32,7 @@ class Source(ABC):
         """What is wrong at the moment; empty: nothing."""
         return ""
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027, most sources hold nothing
         """Give back what the source holds."""
 
 

@@ -1,4 +1,4 @@
-"""Serialized messages to numbers and back, in bulk: a thousand samples a second and topic must cost little."""
+"""Serialized messages to numbers and back, in bulk: at 7000 messages a second each must cost little."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def channel_values(topic: Topic, decoded: Array) -> Array:
 
 
 class StampedDoubles:
-    """Writes messages of one type whose numbers all stand at the end: stamp and doubles change, the rest stays."""
+    """Writes messages of one type whose numbers all stand at the end; all but stamp and numbers stays."""
 
     def __init__(self, template: object, count: int) -> None:
         self._template = np.frombuffer(serialize_message(template), np.uint8)

@@ -1,0 +1,155 @@
+"""Real node processes on a ROS domain of their own, and a probe that speaks to them."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+ROOT = Path(__file__).parents[1]
+_DOMAINS = itertools.count(random.SystemRandom().randrange(1, 60))
+
+RIG = """\
+/**:
+  ros__parameters:
+    gravity: 9.80665
+    mass: 990.6
+    mass_std: 0.5
+    cables: [cable_1, cable_2, cable_3, cable_4]
+    cable_1: {ceiling_point: [0.0, 0.0, 0.0], body_point: [0.0, 0.0, 0.0], length: 1.69}
+    cable_2: {ceiling_point: [3.5, 0.0, 0.0], body_point: [1.48, 0.03, 0.01], length: 2.034}
+    cable_3: {ceiling_point: [0.0, 5.0, 0.0], body_point: [0.01, 2.51, 0.01], length: 1.968}
+    cable_4: {ceiling_point: [3.5, 5.0, 0.0], body_point: [1.51, 2.52, 0.01], length: 2.246}
+    imu: {position: [0.54, 1.43, -0.43], orientation: [0.0, 0.0, 0.70710678, 0.70710678]}
+    inclinometer: {orientation: [0.0, 0.0, 0.0, 1.0]}
+    exciter: {position: [0.0, 0.0, -1.5], orientation: [0.0, 0.38268343, 0.0, 0.92387953]}
+    noise: {tension: 2.0, exciter_force: 0.5, specific_force: 0.01, angular_rate: 0.0003, inclination: 0.0003}
+"""
+#: The simulated body: m, c, J (xx xy xz yy yz zz).
+BODY = [990.2, 0.69, 1.08, -1.07, 1108.6, -1.4, 31.7, 338.3, 18.3, 1295.9]
+SIMULATOR = [
+    f"body.mass:={BODY[0]}", f"body.center_of_mass:={BODY[1:4]}", f"body.inertia:={BODY[4:]}",
+    "shake.amplitude:=[150.0, 120.0, 60.0]", "shake.frequency:=[0.42, 0.71, 1.1]",
+]  # fmt: skip
+
+
+class Graph:
+    """Nodes as processes, all in namespace ``/rig`` with the same rig description."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.domain = next(_DOMAINS) % 100 + 1
+        self.rig_file = folder / "rig.yaml"
+        self.rig_file.write_text(RIG)
+        self.processes: list[subprocess.Popen[str]] = []
+
+    def start(
+        self, name: str, *parameters: str, wait: bool = True, rig: bool = True
+    ) -> subprocess.Popen[str]:
+        """Start a node; wait until its output says nothing or it is there is up to the probe."""
+        command = [sys.executable, "-m", "rig_identification.nodes", name, "--ros-args", "-r", "__ns:=/rig"]
+        if rig:
+            command += ["--params-file", str(self.rig_file)]
+        for parameter in parameters:
+            command += ["-p", parameter]
+        environment = {
+            **os.environ, "ROS_DOMAIN_ID": str(self.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+            "OMP_NUM_THREADS": "1", "ROS_LOG_DIR": str(self.folder / "log"),
+        }  # fmt: skip
+        process = subprocess.Popen(
+            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        self.processes.append(process)
+        return process
+
+    def end(
+        self, process: subprocess.Popen[str], number: int = signal.SIGINT, within: float = 15.0
+    ) -> tuple[int, str]:
+        """Send a signal; returns exit status and output."""
+        process.send_signal(number)
+        output, _ = process.communicate(timeout=within)
+        self.processes.remove(process)
+        return process.returncode, output
+
+    def close(self) -> None:
+        """End what still runs."""
+        for process in self.processes:
+            process.kill()
+            process.communicate()
+
+
+class Probe:
+    """A node of the test's own in the graph's domain."""
+
+    def __init__(self, graph: Graph) -> None:
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=graph.domain)
+        self.node = rclpy.create_node("probe", namespace="/rig", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def spin_until(self, predicate: Callable[[], Any], timeout: float, what: str = "it") -> None:
+        """Spin until ``predicate``; AssertionError after ``timeout`` s."""
+        end = time.monotonic() + timeout
+        while not predicate():
+            assert time.monotonic() < end, f"{what} did not happen within {timeout} s"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def spin_for(self, seconds: float) -> None:
+        """Let the graph run while the probe listens."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def listen(self, kind: Any, topic: str, qos: Any = 1000) -> list[Any]:
+        """List that a topic's messages are appended to."""
+        heard: list[Any] = []
+        self.node.create_subscription(kind, topic, heard.append, qos)
+        return heard
+
+    def begin(self, service: str, within: float = 30.0) -> Any:
+        """Future of a Trigger request."""
+        client = self.node.create_client(Trigger, service)
+        self.spin_until(client.service_is_ready, within, f"service {service}")
+        return client.call_async(Trigger.Request())
+
+    def call(self, service: str, within: float = 30.0) -> Trigger.Response:
+        """Answer to a Trigger request."""
+        future = self.begin(service)
+        self.spin_until(future.done, within, f"answer of {service}")
+        return future.result()
+
+    def set(self, node: str, **values: Any) -> list[str]:
+        """Set parameters (``__`` stands for a dot); reasons of refusals."""
+        client = self.node.create_client(SetParameters, f"{node}/set_parameters")
+        self.spin_until(client.service_is_ready, 30.0, f"parameters of {node}")
+        messages: list[ParameterMessage] = [
+            Parameter(name.replace("__", "."), value=value).to_parameter_msg()
+            for name, value in values.items()
+        ]
+        future = client.call_async(SetParameters.Request(parameters=messages))
+        self.spin_until(future.done, 20.0, f"answer of {node}")
+        return [result.reason for result in future.result().results if not result.successful]
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self.executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
