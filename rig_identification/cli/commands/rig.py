@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import json
 import signal
 import subprocess
 import sys
 import sysconfig
+import tempfile
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -66,8 +68,11 @@ def run(arguments: argparse.Namespace) -> None:
         raise InputError(
             f"--without {', '.join(sorted(unknown))}: the graph has {', '.join(GRAPHS[arguments.graph])}"
         )
-    commands = {name: _command(name, arguments) for name in names}
-    Supervisor(commands).run()
+    with tempfile.TemporaryDirectory(prefix="rig_") as folder:
+        chosen = Path(folder) / "chosen.yaml"
+        chosen.write_text(_chosen(names, arguments), encoding="utf-8")
+        files = [*_files(arguments), chosen]
+        Supervisor({name: _command(name, files, arguments.namespace) for name in names}).run()
 
 
 class Supervisor:
@@ -111,15 +116,24 @@ class Supervisor:
                 process.wait()
 
 
-def _command(name: str, arguments: argparse.Namespace) -> list[str]:
+def _command(name: str, files: Sequence[Path], namespace: str) -> list[str]:
     """Command line of one node."""
     command = [sys.executable, "-m", "rig_identification.nodes", name, "--ros-args"]
-    command += ["-r", f"__ns:=/{arguments.namespace.strip('/')}"]
-    for file in _files(arguments):
+    command += ["-r", f"__ns:=/{namespace.strip('/')}"]
+    for file in files:
         command += ["--params-file", str(file)]
-    for parameter, value in _parameters(name, arguments):
-        command += ["-p", f"{name}:{parameter}:={value}"]  # named, to precede the files
     return command
+
+
+def _chosen(names: Sequence[str], arguments: argparse.Namespace) -> str:
+    """Parameter file of what the command line chose; as specific as the other files, and after them."""
+    lines = ["/**/none:", "  ros__parameters: {none: 0}"]  # a file without parameters is refused
+    for name in names:
+        chosen = _parameters(name, arguments)
+        if chosen:
+            lines += [f"/**/{name}:", "  ros__parameters:"]
+            lines += [f"    {parameter}: {value}" for parameter, value in chosen]
+    return "\n".join(lines) + "\n"
 
 
 def _files(arguments: argparse.Namespace) -> list[Path]:
@@ -150,7 +164,11 @@ def _rig_of(session: Path) -> Path:
 def _parameters(name: str, arguments: argparse.Namespace) -> list[tuple[str, str]]:
     chosen: list[tuple[str, str]] = []
     if arguments.graph == "replay":
-        chosen.append(("use_sim_time", "true") if name != "replay" else ("session", str(arguments.session)))
+        chosen.append(
+            ("use_sim_time", "true")
+            if name != "replay"
+            else ("session", json.dumps(str(arguments.session.resolve())))
+        )
         if name == "replay":
             chosen.append(("operate", "identifier"))
     for text in arguments.parameters:
