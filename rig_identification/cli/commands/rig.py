@@ -21,6 +21,8 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from ruamel.yaml import YAML
+
 from rig_identification.errors import InputError
 
 SENSORS = ("load_cells", "imu", "inclinometer")
@@ -68,11 +70,11 @@ def run(arguments: argparse.Namespace) -> None:
         raise InputError(
             f"--without {', '.join(sorted(unknown))}: the graph has {', '.join(GRAPHS[arguments.graph])}"
         )
+    rig, nodes = _files(arguments)
     with tempfile.TemporaryDirectory(prefix="rig_") as folder:
-        chosen = Path(folder) / "chosen.yaml"
-        chosen.write_text(_chosen(names, arguments), encoding="utf-8")
-        files = [*_files(arguments), chosen]
-        Supervisor({name: _command(name, files, arguments.namespace) for name in names}).run()
+        merged = Path(folder) / "nodes.yaml"
+        _write_merged(merged, nodes, {name: _parameters(name, arguments) for name in names})
+        Supervisor({name: _command(name, [rig, merged], arguments.namespace) for name in names}).run()
 
 
 class Supervisor:
@@ -125,18 +127,40 @@ def _command(name: str, files: Sequence[Path], namespace: str) -> list[str]:
     return command
 
 
-def _chosen(names: Sequence[str], arguments: argparse.Namespace) -> str:
-    """Parameter file of what the command line chose; as specific as the other files, and after them."""
-    lines = ["/**/none:", "  ros__parameters: {none: 0}"]  # a file without parameters is refused
-    for name in names:
-        chosen = _parameters(name, arguments)
-        if chosen:
-            lines += [f"/**/{name}:", "  ros__parameters:"]
-            lines += [f"    {parameter}: {value}" for parameter, value in chosen]
-    return "\n".join(lines) + "\n"
+def _write_merged(file: Path, nodes: Path | None, chosen: dict[str, list[tuple[str, str]]]) -> None:
+    """One parameter file of ``nodes`` and what the command line chose.
+
+    A parameter that two files give in different types keeps the first (rcl), so no two files may.
+    """
+    yaml = YAML(typ="safe", pure=True)
+    sections: dict[str, dict[str, object]] = {}
+    if nodes is not None:
+        for key, section in (yaml.load(nodes.read_text(encoding="utf-8")) or {}).items():
+            sections[key] = _flat(section.get("ros__parameters") or {})
+    for name, parameters in chosen.items():
+        own = [section for key, section in sections.items() if key.split("/")[-1] == name]
+        for parameter, text in parameters:
+            for section in own or [sections.setdefault(f"/**/{name}", {})]:
+                section[parameter] = yaml.load(text)
+    sections.setdefault("/**/none", {"none": 0})  # a file without parameters is refused
+    document = {key: {"ros__parameters": section} for key, section in sections.items() if section}
+    with file.open("w", encoding="utf-8") as stream:
+        yaml.dump(document, stream)
 
 
-def _files(arguments: argparse.Namespace) -> list[Path]:
+def _flat(tree: dict[str, object], prefix: str = "") -> dict[str, object]:
+    """Nested parameters by their dotted names."""
+    flat: dict[str, object] = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat.update(_flat(value, f"{prefix}{key}."))
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat
+
+
+def _files(arguments: argparse.Namespace) -> tuple[Path, Path | None]:
+    """Rig description and the nodes' parameters."""
     if arguments.graph == "replay":
         if arguments.session is None:
             raise InputError("replay: name the session to play")
@@ -148,11 +172,10 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
         if arguments.rig is None:
             raise InputError("live: give the rig description with --rig")
         rig, nodes = arguments.rig, arguments.nodes or _packaged("rig_nodes.yaml")
-    files = [rig, *([nodes] if nodes else [])]
-    for file in files:
-        if not file.is_file():
+    for file in (rig, nodes):
+        if file is not None and not file.is_file():
             raise InputError(f"{file}: does not exist; correct its path")
-    return files
+    return rig, nodes
 
 
 def _rig_of(session: Path) -> Path:
