@@ -8,6 +8,7 @@ import numpy as np
 
 from rig_identification.model.body import six_elements
 from rig_identification.recording import Dummy
+from rig_identification.rig import Rig
 from rig_identification.simulate.spec import RunSpec, SampleRates, SessionSpec, StaticSpec
 from rig_identification.simulate.start import Posed, Pulled
 from rig_identification.thesis.case import Case
@@ -48,20 +49,24 @@ def case_spec(
     if holdout:
         pull = PULL * case.mass * rig.gravity * np.array([0.6, 0.8, 0.0])
         runs.append(RunSpec("run_2", duration, Pulled(pull, case.center_of_mass), force, holdout=True))
-    hinges = np.array([cable.body_point for cable in rig.cables])
-    place = np.round(hinges.min(axis=0) + 0.3 * np.ptp(hinges, axis=0), 2)
-    statics = (
-        StaticSpec("static_bare", rest),
-        StaticSpec("static_dummy", rest, Dummy(float(np.round(DUMMY * case.mass, 1)), place)),
-    )
     return SessionSpec(
         name=f"case_{case.label}",
         rig=rig,
         elements=elements,
         runs=tuple(runs),
-        statics=statics if rest > 0.0 else (),
+        statics=resting(rig, case.mass, rest),
         rates=rates or SampleRates(),
         noise=noise,
         doubts=doubts,
         rods=rods,
     )
+
+
+def resting(rig: Rig, mass: float, seconds: float) -> tuple[StaticSpec, ...]:
+    """Bare, and with a dummy of a 25th of ``mass`` between the hinges; none for 0 s."""
+    if seconds <= 0.0:
+        return ()
+    hinges = np.array([cable.body_point for cable in rig.cables])
+    place = np.round(hinges.min(axis=0) + 0.3 * np.ptp(hinges, axis=0), 3)
+    dummy = Dummy(float(f"{DUMMY * mass:.2g}"), place)
+    return (StaticSpec("static_bare", seconds), StaticSpec("static_dummy", seconds, dummy))

@@ -1,0 +1,116 @@
+"""``simulate`` and ``demo`` as a person at the keyboard meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig_identification.cli.main import main
+from rig_identification.session import read_session
+
+CONFIG = Path(__file__).parents[1] / "config"
+PLATE = ["42", "0.3", "0.18", "-0.12", "1.9", "0.03", "-0.05", "2.4", "0.02", "3.6"]
+NO_BODY = ["1", "0", "0", "0", "1", "0", "0", "1", "0", "9"]
+BAR = ["12", "0.4", "0", "-0.05", "0.09", "0", "0", "1.1", "0", "1.15"]
+
+
+def simulate(out: Path, *arguments: str) -> int:
+    return main(["simulate", "--out", str(out), "--duration", "2", "--rest", "1", *arguments])
+
+
+def test_demo_makes_a_session_identifies_it_and_names_the_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "demo"
+    assert main(["demo", "--out", str(out), "--duration", "10"]) == 0
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert last == f"report: {out / 'report.html'}"
+    assert "<html" in (out / "report.html").read_text(encoding="utf-8")[:500]
+    result = json.loads((out / "result.json").read_text())
+    truth = json.loads((out / "session" / "truth.json").read_text())
+    assert abs(result["mass"]["value"] - truth["mass"]) < 4.0 * result["mass"]["std"]
+    off = np.subtract(result["inertia"]["value"], truth["inertia"]) / result["inertia"]["std"]
+    assert np.max(np.abs(off)) < 4.0
+    session = read_session(out / "session")
+    assert [r.holdout for r in session.recordings] == [False, False, False, True]
+
+
+def test_demo_leaves_a_folder_of_another_kind_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "session").mkdir()
+    (tmp_path / "session" / "notes.txt").write_text("mine")
+    assert main(["demo", "--out", str(tmp_path)]) == 2
+    assert "is no session" in capsys.readouterr().err
+    assert [p.name for p in (tmp_path / "session").iterdir()] == ["notes.txt"]
+
+
+def test_simulate_writes_a_session_with_its_truth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "car"
+    options = ("--start", "pulled", "--shake", "0.05", "0.7", "--storage", "sqlite3", "--compression", "file")
+    assert simulate(out, "--case", "14", "--seed", "3", *options) == 0
+    assert capsys.readouterr().out == f"session: {out}\n"
+    session = read_session(out)
+    assert [r.kind for r in session.recordings] == ["static", "static", "dynamic", "dynamic"]
+    assert session.recordings[2].exciter_shaft is not None
+    truth = json.loads((out / "truth.json").read_text())
+    assert truth["inertia"][1][2] == 70.0
+    length = truth["parameters"]["cable_1.length"]
+    assert 0.0 < abs(length["value"] - length["described"]) < 0.0015
+
+
+def test_simulate_on_a_described_rig_with_motion_capture_alone(tmp_path: Path) -> None:
+    out = tmp_path / "bifilar"
+    options = ("--mocap", "60", "--without", "tension", "--no-noise", "--no-doubts")
+    assert simulate(out, "--rig", str(CONFIG / "bifilar.yaml"), "--body", *BAR, *options) == 0
+    run = read_session(out).training[0]
+    assert run.mocap is not None
+    assert run.imu is None
+    assert not run.tension
+
+
+def test_a_slack_cable_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Case 14 starts from where its rods push: cables let go."""
+    assert simulate(tmp_path / "slack", "--case", "14", "--duration", "8") == 0
+    assert "a cable goes slack in run_1" in capsys.readouterr().out
+    assert simulate(tmp_path / "rods", "--case", "14", "--duration", "8", "--rods") == 0
+    assert "a cable is pushed in run_1" in capsys.readouterr().out
+
+
+def test_simulate_overwrites_when_told_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert simulate(tmp_path / "s", "--case", "10", "--start", "rest") == 0
+    assert simulate(tmp_path / "s", "--case", "10", "--start", "rest") == 2
+    assert "exists already" in capsys.readouterr().err
+    assert simulate(tmp_path / "s", "--case", "10", "--start", "rest", "--overwrite") == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--case", "19"], "case study 19"),
+        (["--case", "14e"], "--case 14e: is no case study"),
+        (["--case", "14", "--body", *PLATE], "a case study has its own body"),
+        (["--rig", str(CONFIG / "trifilar.yaml")], "--body: missing"),
+        (
+            ["--rig", str(CONFIG / "trifilar.yaml"), "--body", *NO_BODY],
+            "no body has",
+        ),
+        (["--rig", str(CONFIG / "bifilar.yaml"), "--body", *BAR], "noise.tension: missing"),
+        (["--rig", "absent.yaml", "--body", *PLATE], "absent.yaml"),
+        (["--case", "14", "--shake", "0", "1"], "--shake 0 1"),
+        (["--case", "14", "--seed", "-1"], "--seed -1"),
+        (["--case", "14", "--duration", "0.5"], "--duration 0.5"),
+        (["--case", "14", "--mocap", "nan"], "--mocap nan"),
+    ],
+)
+def test_what_cannot_be_simulated_has_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
+) -> None:
+    assert simulate(tmp_path / "s", *arguments) == 2
+    error = capsys.readouterr().err
+    assert says in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "s").exists()

@@ -1,0 +1,290 @@
+"""The simulator: what it records is the forward model's, with doubts, noise and clocks as described."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rig_identification.errors import InputError
+from rig_identification.model.body import tensor
+from rig_identification.recording import Dummy, Recording, Session
+from rig_identification.rig import Mount
+from rig_identification.session import read_rig, read_session, write_session
+from rig_identification.simulate import (
+    AtRest,
+    Posed,
+    Pulled,
+    RunSpec,
+    SampleRates,
+    SessionSpec,
+    StaticSpec,
+    UnbalancedMass,
+    case_spec,
+    simulate_session,
+)
+from rig_identification.thesis import load_case
+
+RATES = SampleRates(tension=200.0, exciter=200.0, shaft=50.0, imu=100.0, inclinometer=50.0, mocap=60.0)
+CONFIG = Path(__file__).parents[1] / "config"
+CAR = load_case(14)
+WEIGHT = CAR.mass * CAR.rig.gravity
+PULL = Pulled(0.06 * WEIGHT * np.array([0.6, 0.8, 0.0]), CAR.center_of_mass + np.array([0.3, 0.2, 0.0]))
+MOTOR = UnbalancedMass(0.05 * WEIGHT / (2.0 * np.pi * 0.7) ** 2, 0.7, ramp=1.0)
+
+
+def car(*runs: RunSpec, **changes: object) -> SessionSpec:
+    """The car of case study 14 with ``runs``, exactly as described and without noise."""
+    spec = case_spec(CAR, rest=2.0, rates=RATES, noise=False, doubts=False)
+    return replace(spec, runs=runs, **changes)
+
+
+def recorded(spec: SessionSpec, seed: int = 0) -> Recording:
+    return simulate_session(spec, np.random.default_rng(seed))[0].recordings[-1]
+
+
+def truth_at(recording: Recording, time: np.ndarray) -> np.ndarray:
+    """Odometry at other instants."""
+    odometry = recording.ground_truth
+    return np.stack([np.interp(time, odometry.time, column) for column in odometry.values.T], axis=1)
+
+
+def test_at_rest_vertical_cables_carry_the_weight_and_the_dummy() -> None:
+    rig = read_rig(CONFIG / "trifilar.yaml")
+    elements = np.array([42.0, 0.3, 0.18, -0.12, 1.9, 0.03, -0.05, 2.4, 0.02, 3.6])
+    dummy = Dummy(3.0, np.array([0.1, 0.2, 0.0]))
+    statics = (StaticSpec("bare", 1.0), StaticSpec("dummy", 1.0, dummy))
+    spec = SessionSpec("plate", rig, elements, statics=statics, noise=False, doubts=False)
+    session, _ = simulate_session(spec, np.random.default_rng(0))
+    hinges = np.array([cable.body_point for cable in rig.cables])
+    for recording, mass, moment in zip(
+        session.recordings,
+        (42.0, 45.0),
+        (42.0 * elements[1:3], 42.0 * elements[1:3] + 3.0 * dummy.position[:2]),
+        strict=True,
+    ):
+        tension = np.array([recording.tension[cable.name].values[:, 0] for cable in rig.cables])
+        assert np.ptp(tension, axis=1) == pytest.approx(np.zeros(3), abs=1e-12)
+        assert np.sum(tension[:, 0]) == pytest.approx(mass * rig.gravity, rel=1e-9)
+        # Level, as the hinges and lengths are, so that moments balance about both axes
+        assert tension[:, 0] @ hinges[:, :2] == pytest.approx(moment * rig.gravity, rel=1e-4)
+
+
+def test_a_run_from_rest_without_force_stays_at_rest() -> None:
+    run = recorded(car(RunSpec("still", 2.0, AtRest())))
+    assert np.ptp(run.ground_truth.values[:, :7], axis=0) == pytest.approx(np.zeros(7), abs=1e-7)
+
+
+def test_pulled_and_let_go_the_body_swings_through_rest_with_its_energy_kept() -> None:
+    run = recorded(car(RunSpec("swing", 6.0, PULL)))
+    pose, twist = run.ground_truth.values[:, :7], run.ground_truth.values[:, 7:]
+    center = np.array([CAR.center_of_mass])
+    turns = Rotation.from_quat(pose[:, 3:])
+    height = (pose[:, :3] + turns.apply(np.repeat(center, len(pose), axis=0)))[:, 2]
+    speed = twist[:, :3] + np.cross(twist[:, 3:], center)
+    spin = np.einsum("ni,ij,nj->n", twist[:, 3:], CAR.inertia, twist[:, 3:])
+    energy = 0.5 * CAR.mass * np.sum(speed**2, axis=1) + 0.5 * spin + WEIGHT * height
+    kinetic = energy - WEIGHT * height
+    assert kinetic[0] < 0.25 * kinetic.max(), "0.06 s, a fifteenth of a period, after it was let go"
+    assert np.ptp(energy) < 1e-5 * kinetic.max()
+
+
+def test_the_pull_bends_the_start_its_own_way() -> None:
+    places = []
+    for sign in (-1.0, 1.0):
+        run = recorded(car(RunSpec("swing", 1.0, Pulled(sign * PULL.force, PULL.point))))
+        pose = run.ground_truth.values[0, :7]
+        places.append(pose[:3] + Rotation.from_quat(pose[3:]).apply(PULL.point))
+    assert (places[1] - places[0]) @ PULL.force > 0.001 * np.linalg.norm(PULL.force)
+
+
+def test_a_given_pose_is_kept_and_one_off_the_cables_refused() -> None:
+    start = Posed(CAR.position, CAR.orientation)
+    run = recorded(car(RunSpec("thesis", 1.0, start), rods=True))
+    assert run.ground_truth.values[0, :3] == pytest.approx(CAR.position, abs=0.02)
+    lifted = Posed(CAR.position + np.array([0.0, 0.0, 0.4]), CAR.orientation)
+    with pytest.raises(InputError, match="away from the given one"):
+        recorded(car(RunSpec("lifted", 1.0, lifted)))
+
+
+def test_the_exciter_pulls_with_m_r_w_squared_in_its_plane() -> None:
+    time = np.linspace(0.0, 5.0, 5001)
+    force, shaft = MOTOR(time), MOTOR.shaft(time)
+    full = time > 1.0
+    assert np.linalg.norm(force[full], axis=1) == pytest.approx(0.05 * WEIGHT, rel=1e-12)
+    assert np.all(force[:, 2] == 0.0)
+    assert np.gradient(shaft[:, 0], time)[1:-1] == pytest.approx(shaft[1:-1, 1], abs=2e-3)
+    # The mass itself obeys Newton: the force is the reaction to its acceleration about the shaft
+    arm = np.stack([np.cos(shaft[:, 0]), np.sin(shaft[:, 0])], axis=1)
+    acceleration = np.gradient(np.gradient(arm, time, axis=0), time, axis=0)
+    assert force[3:-3, :2] == pytest.approx(-MOTOR.unbalance * acceleration[3:-3], abs=1e-3 * 0.05 * WEIGHT)
+    with pytest.raises(InputError, match="plane 'zz'"):
+        UnbalancedMass(1.0, 1.0, "zz")
+
+
+def test_a_force_along_world_axes_is_measured_in_the_turning_exciter_frame() -> None:
+    case = load_case(7)
+    spec = replace(case_spec(case, duration=3.0, noise=False, doubts=False, rods=True), rates=RATES)
+    run = recorded(replace(spec, runs=spec.runs[:1]))
+    turns = Rotation.from_quat(truth_at(run, run.exciter_force.time)[:, 3:7])
+    in_world = turns.apply(run.exciter_force.values)
+    time = run.exciter_force.time
+    # The recording starts 0.05 s after the run and some samples later; steps blur by one node
+    begin = 0.05
+    given = np.array([case.force(time + begin + shift) for shift in (-0.008, 0.0, 0.008)])
+    steady = np.all(np.abs(np.diff(given, axis=0)) < 5.0, axis=(0, 2))
+    assert np.count_nonzero(steady) > 100
+    assert in_world[steady] == pytest.approx(given[1][steady], abs=6.0)
+
+
+def test_sensors_see_the_same_motion_at_their_own_instants() -> None:
+    run = recorded(car(RunSpec("run", 4.0, PULL, MOTOR)))
+    rate = truth_at(run, run.imu.time)[:, 10:13]
+    assert run.imu.values[5:-5, :3] == pytest.approx(rate[5:-5], abs=2e-4)
+    instants = [run.imu.time[3], run.inclination.time[3], *(s.time[3] for s in run.tension.values())]
+    assert len({round(t, 7) for t in instants}) == len(instants), "no two devices sample together"
+    z = Rotation.from_quat(truth_at(run, run.inclination.time)[:, 3:7]).as_matrix()[:, 2, :2]
+    assert run.inclination.values[2:-2] == pytest.approx(np.arcsin(z)[2:-2], abs=2e-4)
+
+
+def test_motion_capture_sees_the_marker_frame_from_its_tracker() -> None:
+    turned = Rotation.from_euler("xyz", [0.3, -0.2, 1.0])
+    marker = Mount(np.array([0.4, -0.1, 0.2]), turned.as_quat())
+    spec = car(RunSpec("run", 3.0, PULL))
+    run = recorded(replace(spec, rig=replace(spec.rig, mocap=marker)))
+    truth = truth_at(run, run.mocap.time)
+    body = Rotation.from_quat(truth[:, 3:7] / np.linalg.norm(truth[:, 3:7], axis=1, keepdims=True))
+    tracker = Rotation.from_quat(spec.world_in_tracker.orientation)
+    place = tracker.apply(truth[:, :3] + body.apply(marker.position)) + spec.world_in_tracker.position
+    assert run.mocap.values[2:-2, :3] == pytest.approx(place[2:-2], abs=2e-4)
+    off = (tracker * body * turned).inv() * Rotation.from_quat(run.mocap.values[:, 3:])
+    assert np.max(off.magnitude()[2:-2]) < 2e-4
+
+
+def test_noise_has_the_size_that_the_description_states() -> None:
+    spec = replace(car(), noise=True, statics=(StaticSpec("long", 60.0),))
+    recording = recorded(replace(spec, rig=replace(spec.rig, mocap=Mount(np.zeros(3), CAR.orientation))))
+    noise = spec.rig.noise
+    for values, name in (
+        (recording.tension["cable_2"].values, "tension"),
+        (recording.imu.values[:, :3], "angular_rate"),
+        (recording.imu.values[:, 3:], "specific_force"),
+        (recording.inclination.values, "inclination"),
+        (recording.mocap.values[:, :3], "mocap_position"),
+    ):
+        assert np.std(values, axis=0) == pytest.approx(np.full(values.shape[1], noise[name]), rel=0.06)
+    turns = Rotation.from_quat(recording.mocap.values[:, 3:])
+    spread = np.std((turns.mean().inv() * turns).as_rotvec(), axis=0)
+    assert spread == pytest.approx(np.full(3, noise["mocap_orientation"]), rel=0.06)
+    missing = replace(spec, rig=replace(spec.rig, noise={}))
+    with pytest.raises(InputError, match=r"noise\.\w+: missing"):
+        simulate_session(missing, np.random.default_rng(0))
+
+
+def test_doubts_are_drawn_by_the_tolerances_and_within_three_of_them() -> None:
+    spec = replace(car(), doubts=True, statics=(StaticSpec("short", 1.0),))
+    draws = []
+    for seed in range(40):
+        session, truth = simulate_session(spec, np.random.default_rng(seed))
+        off = {n: truth.parameters[n] - truth.described[n] for n in truth.parameters}
+        draws.append([off["cable_2.length"], off["imu.gyroscope_bias.y"], off["imu.clock"]])
+        mass = session.rig.mass - CAR.mass
+        draws[-1].append(mass)
+    tolerance = spec.rig.tolerance
+    std = np.array(
+        [tolerance["cable_length"], tolerance["gyroscope_bias"], tolerance["clock"], spec.rig.mass_std]
+    )
+    scaled = np.array(draws) / std
+    assert np.all(np.abs(scaled[:, :3]) <= 3.0)
+    assert np.all(np.std(scaled, axis=0) > 0.65)
+    assert np.all(np.std(scaled, axis=0) < 1.35)
+    exact, truth = simulate_session(replace(spec, doubts=False), np.random.default_rng(0))
+    assert truth.parameters == pytest.approx(truth.described)
+    assert exact.rig.mass == CAR.mass
+
+
+def test_a_late_clock_makes_late_stamps() -> None:
+    spec = car(RunSpec("run", 3.0, PULL))
+    wide = dict(spec.rig.tolerance) | {"clock": 0.05}
+    quiet = {name: 0.0 for name in wide if name != "clock"}
+    spec = replace(spec, doubts=True, rig=replace(spec.rig, tolerance=wide | quiet, mass_std=1e-9))
+    session, truth = simulate_session(spec, np.random.default_rng(3))
+    run = session.recordings[-1]
+    late = truth.parameters["imu.clock"]
+    assert abs(late) > 0.005
+    rate = truth_at(run, run.imu.time - late)[:, 10:13]
+    inside = slice(20, -20)
+    assert run.imu.values[inside, :3] == pytest.approx(rate[inside], abs=2e-4)
+
+
+def test_the_same_seed_gives_the_same_session() -> None:
+    spec = replace(car(RunSpec("run", 1.0, PULL, MOTOR)), noise=True, doubts=True)
+    one, other, third = (recorded(spec, seed) for seed in (5, 5, 6))
+    assert np.array_equal(one.imu.values, other.imu.values)
+    assert not np.array_equal(one.imu.values[:50], third.imu.values[:50])
+
+
+def test_devices_can_be_left_out() -> None:
+    rates = SampleRates(tension=0.0, exciter=0.0, shaft=0.0, imu=100.0, inclinometer=0.0, ground_truth=0.0)
+    run = recorded(replace(car(RunSpec("run", 1.0, PULL, MOTOR)), rates=rates, statics=()))
+    assert run.imu is not None
+    assert not run.tension
+    assert run.exciter_force is None
+    assert run.exciter_shaft is None
+    assert run.ground_truth is None
+    nothing = replace(rates, imu=0.0)
+    with pytest.raises(InputError, match="no device records"):
+        recorded(replace(car(RunSpec("run", 1.0, PULL)), rates=nothing, statics=()))
+
+
+@pytest.mark.parametrize(("storage", "compression"), [("mcap", "none"), ("sqlite3", "message")])
+def test_a_simulated_session_survives_the_disk(tmp_path: Path, storage: str, compression: str) -> None:
+    spec = replace(car(RunSpec("run_1", 2.0, PULL, MOTOR)), noise=True, doubts=True)
+    session, _ = simulate_session(spec, np.random.default_rng(1))
+    write_session(session, tmp_path / "s", storage=storage, compression=compression)
+    again: Session = read_session(tmp_path / "s")
+    assert [r.name for r in again.recordings] == ["static_bare", "static_dummy", "run_1"]
+    for before, after in zip(session.recordings, again.recordings, strict=True):
+        assert (before.start_ns, before.kind) == (after.start_ns, after.kind)
+        for name in ("imu", "inclination", "exciter_force", "exciter_shaft", "mocap", "ground_truth"):
+            one, other = getattr(before, name), getattr(after, name)
+            assert (one is None) == (other is None), name
+            if one is not None:
+                assert other.time == pytest.approx(one.time, abs=1.1e-9)
+                assert other.values == pytest.approx(one.values, abs=1e-12)
+        for cable, series in before.tension.items():
+            assert after.tension[cable].values == pytest.approx(series.values)
+    assert again.rig.mass == pytest.approx(session.rig.mass)
+
+
+def test_every_case_of_the_thesis_can_be_simulated() -> None:
+    """Case 8 and its kind push on their cables: rods."""
+    for number in (1, 5, 8, 14, 16):
+        spec = case_spec(load_case(number), duration=2.0, rest=0.0, holdout=False, rates=RATES, rods=True)
+        session, truth = simulate_session(spec, np.random.default_rng(number))
+        assert session.training[0].duration == pytest.approx(2.0, abs=0.06)
+        assert np.array_equal(tensor(truth.elements[4:]), load_case(number).inertia)
+
+
+@pytest.mark.parametrize(
+    ("name", "elements"),
+    [
+        ("car_four_cables", [1145, 0.8, 1.128, -1.137, 1617, 0, 0, 365, 70, 1785]),
+        ("trifilar", [42, 0.3, 0.18, -0.12, 1.9, 0.03, -0.05, 2.4, 0.02, 3.6]),
+        ("bifilar", [12, 0.4, 0, -0.05, 0.09, 0, 0, 1.1, 0, 1.15]),
+    ],
+)
+def test_the_example_rigs_hang_and_swing(name: str, elements: list[float]) -> None:
+    rig = read_rig(CONFIG / f"{name}.yaml")
+    body = np.array(elements, dtype=float)
+    assert rig.mass == body[0]
+    pull = Pulled(
+        0.05 * body[0] * rig.gravity * np.array([0.6, 0.8, 0.0]), body[1:4] + np.array([0.1, 0.0, 0.0])
+    )
+    spec = SessionSpec(name, rig, body, (RunSpec("run", 4.0, pull),), rates=RATES, noise=False)
+    session, truth = simulate_session(spec, np.random.default_rng(2))
+    assert truth.least_tension["run"] > 0.1 * body[0] * rig.gravity / len(rig.cables)
+    assert np.max(np.ptp(session.training[0].ground_truth.values[:, :3], axis=0)) > 0.005
