@@ -171,6 +171,7 @@ def score(entries: list[dict[str, Any]]) -> dict[str, Any]:
     inside = np.abs(error) <= 1.96 * std
     return {
         "sessions": len(entries),
+        "code": entries[0]["code"],
         "convergence": float(np.mean([e["converged"] for e in entries])),
         "coverage": float(np.mean(inside[:, judged])),
         "median_seconds": float(np.median([e["seconds"] for e in done])),
@@ -222,6 +223,8 @@ def as_markdown(scores: dict[str, dict[str, Any]]) -> str:
     misses = [
         f"- {name}, session {f['session']}: {f['what']}" for name, s in scores.items() for f in s["failures"]
     ]
+    codes = sorted({s["code"] for s in scores.values()})
+    lines += ["", f"Fingerprint of the code: {', '.join(codes)}"]
     return "\n".join([*lines, "", "Sessions that did not converge:", "", *(misses or ["- none"]), ""])
 
 
