@@ -96,7 +96,7 @@ def _watch(
     mounts = mounts_near(spec.rig, true.parameters.places, spec.world_in_tracker, R_world_body)
     out = {}
     for device in sorted(channels_of(spec)):
-        instant = watch.instants(float(getattr(spec.rates, device, spec.rates.tension)), rng)
+        instant = watch.instants(spec.rates.of(device), rng)
         values = sampled(device, mounts, instant)
         values = values + noise_std(spec, device) * rng.standard_normal(values.shape)
         stamp = instant + true.late(device)

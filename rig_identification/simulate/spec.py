@@ -30,6 +30,11 @@ class SampleRates:
     mocap: float = 0.0
     ground_truth: float = 100.0
 
+    def of(self, device: str) -> float:
+        """Rate of imu, inclinometer or mocap, and of any other name as of a cable."""
+        rates = {"imu": self.imu, "inclinometer": self.inclinometer, "mocap": self.mocap}
+        return rates.get(device, self.tension)
+
 
 @dataclass(frozen=True)
 class RunSpec:

@@ -65,8 +65,8 @@ def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
     if spec.doubts:
         drawn = truncnorm.rvs(-CUT, CUT, size=len(parameters.free), random_state=rng)
         # A mount that no one described is not a doubt: it stays where the simulation puts it
-        known = np.array([p.prior_std < UNKNOWN_ROTATION or p.unit == "N" for p in parameters.free])
-        theta[INERTIAL:] = np.where(known, drawn, 0.0)
+        unknown = [p.name.startswith("mocap.") and p.prior_std >= UNKNOWN_ROTATION for p in parameters.free]
+        theta[INERTIAL:] = np.where(unknown, 0.0, drawn)
         if described.mass is not None and described.mass_std is not None:
             reading = float(spec.elements[0]) + described.mass_std * float(rng.standard_normal())
             described = replace(described, mass=reading)
