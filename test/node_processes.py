@@ -9,7 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,10 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
+
+with warnings.catch_warnings():  # the wheels' lark imports a deprecated module
+    warnings.simplefilter("ignore", DeprecationWarning)
+    import rosidl_generator_py  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
 _DOMAINS = itertools.count(random.SystemRandom().randrange(1, 60))
@@ -58,13 +63,12 @@ class Graph:
         self.rig_file.write_text(RIG)
         self.processes: list[subprocess.Popen[str]] = []
 
-    def start(
-        self, name: str, *parameters: str, wait: bool = True, rig: bool = True
-    ) -> subprocess.Popen[str]:
-        """Start a node; wait until its output says nothing or it is there is up to the probe."""
-        command = [sys.executable, "-m", "rig_identification.nodes", name, "--ros-args", "-r", "__ns:=/rig"]
-        if rig:
-            command += ["--params-file", str(self.rig_file)]
+    def start(self, name: str, *parameters: str, remaps: Sequence[str] = ()) -> subprocess.Popen[str]:
+        """Start a node; that it is there is for the probe to see."""
+        command = [sys.executable, "-m", "rig_identification.nodes", name, "--ros-args"]
+        command += ["--params-file", str(self.rig_file)]
+        for remap in ("__ns:=/rig", *remaps):
+            command += ["-r", remap]
         for parameter in parameters:
             command += ["-p", parameter]
         environment = {

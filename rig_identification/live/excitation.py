@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rig_identification.estimate.sampling import white_noise_std
 from rig_identification.recording import Recording, Series
 
 #: A channel whose readings scatter by less than so many times its white noise shows no motion.
@@ -20,9 +20,16 @@ def motion_in_noise(recording: Recording) -> float:
     ratios = []
     for one in series:
         if len(one.values) > 50:
-            noise = np.maximum(white_noise_std(one.values), 1e-12)
-            ratios.append(float(np.max(np.std(one.values, axis=0) / noise)))
+            ratios.append(float(np.max(np.std(one.values, axis=0) / white_noise(one.values))))
     return max(ratios) if ratios else float("nan")
+
+
+def white_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(w,) standard deviation of what changes from sample to sample: motion is slow, noise is not.
+
+    Fourth differences cancel what is smooth and widen white noise by sqrt(70).
+    """
+    return np.asarray(np.maximum(np.std(np.diff(values, n=4, axis=0), axis=0) / np.sqrt(70.0), 1e-12))
 
 
 def moves(recording: Recording) -> bool:

@@ -1,0 +1,165 @@
+"""The graph as processes: simulated rig up, motion recorded, body identified by service, session replayed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import InertiaStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from node_processes import BODY, SIMULATOR, Graph, Probe
+from std_msgs.msg import Float64MultiArray
+from visualization_msgs.msg import MarkerArray
+
+from rig_identification.estimate import identify
+from rig_identification.nodes.rig_node import LATCHED
+from rig_identification.session import read_session
+
+DUMMY = [0.16, 0.2, -0.2]
+
+
+def ten_of(message: InertiaStamped) -> np.ndarray:
+    i = message.inertia
+    return np.array([i.m, i.com.x, i.com.y, i.com.z, i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz])
+
+
+def record(probe: Probe, seconds: float, **recording: object) -> None:
+    assert not probe.set("recorder", **{f"recording__{name}": value for name, value in recording.items()})
+    assert probe.call("recorder/start").success
+    probe.spin_for(seconds)
+    answer = probe.call("recorder/stop")
+    assert answer.success, answer.message
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session that the recorder wrote of the simulated rig; odometry and wrench were watched meanwhile."""
+    folder = tmp_path_factory.mktemp("recorded")
+    graph = Graph(folder)
+    try:
+        graph.start("rig_simulator", *SIMULATOR)
+        graph.start("load_cells", "simulation.rate:=200.0")
+        graph.start("imu", "simulation.rate:=200.0", "simulation.bias:=[0.0, 0.0, 0.0, 0.01, 0.0, -0.01]")
+        graph.start("inclinometer", "simulation.rate:=50.0")
+        graph.start("tracker")
+        graph.start("preprocessor")
+        recorder = graph.start("recorder", f"folder:={folder / 'session'}")
+        probe = Probe(graph)
+        odometry = probe.listen(Odometry, "odometry")
+        wrench = probe.listen(WrenchStamped, "generalized_wrench")
+        markers = probe.listen(MarkerArray, "markers")
+        truth = probe.listen(Odometry, "ground_truth/odometry")
+        probe.spin_until(lambda: odometry and wrench and markers and truth, 60.0, "the graph")
+        record(probe, 2.0, kind="static")
+        probe.set("rig_simulator", dummy__mass=50.0, dummy__position=DUMMY)
+        assert probe.call("rig_simulator/come_to_rest").success
+        record(probe, 2.0, kind="static", dummy_mass=50.0, dummy_position=DUMMY)
+        probe.set("rig_simulator", dummy__mass=0.0)
+        probe.call("rig_simulator/come_to_rest")
+        probe.call("rig_simulator/shake")
+        record(probe, 8.0, kind="dynamic")
+        check_tracking(odometry[-400:], truth)
+        assert len(markers[-1].markers) == 4
+        assert graph.end(recorder) == (0, "")
+        probe.close()
+    finally:
+        graph.close()
+    return folder / "session"
+
+
+def check_tracking(odometry: list[Odometry], truth: list[Odometry]) -> None:
+    """Tracked positions lie within 3 mm of the ground truth's, and within their own deviation's reach."""
+
+    def stamp(m: Odometry) -> float:
+        return float(m.header.stamp.sec % 100_000 + 1e-9 * m.header.stamp.nanosec)
+
+    def place(m: Odometry) -> list[float]:
+        p = m.pose.pose.position
+        return [p.x, p.y, p.z]
+
+    times, places = [stamp(m) for m in truth], np.array([place(m) for m in truth])
+    inside = [m for m in odometry if stamp(m) < times[-1]]
+    expected = np.stack(
+        [np.interp([stamp(m) for m in inside], times, places[:, i]) for i in range(3)], axis=1
+    )
+    error = np.array([place(m) for m in inside]) - expected
+    std = np.sqrt(np.array([[m.pose.covariance[i * 7] for i in range(3)] for m in inside]))
+    assert len(inside) > 200
+    assert np.max(np.abs(error)) < 0.003
+    assert np.mean(np.abs(error) < 3.0 * std) > 0.99
+
+
+def test_the_recorder_lost_no_sample(recorded: Path) -> None:
+    session = read_session(recorded)
+    assert [(r.name, r.kind) for r in session.recordings] == [
+        ("static_1", "static"),
+        ("static_2", "static"),
+        ("run_1", "dynamic"),
+    ]
+    assert session.recordings[1].dummy is not None
+    assert session.recordings[1].dummy.mass == 50.0
+    for recording in session.recordings:
+        assert set(recording.tension) == {f"cable_{i}" for i in range(1, 5)}
+        for quality in recording.quality:
+            assert (quality.missing, quality.duplicated, quality.backward) == (0, 0, 0), quality
+    assert session.rig.cables[1].length == 2.034
+
+    """Windows of a replay give what the offline estimate gives; by service, within 3 deviations of the truth."""
+def test_a_session_replayed_gives_the_same_inertia_as_read_from_disk(recorded: Path, tmp_path: Path) -> None:
+    """Windows of a replay against the offline estimate: equal; by service within 3 deviations of the truth."""
+    offline = identify(read_session(recorded)).total
+    graph = Graph(tmp_path)
+    try:
+        graph.start("tracker", "use_sim_time:=true")
+        identifier = graph.start("identifier", "use_sim_time:=true", "running_rate:=2.0")
+        probe = Probe(graph)
+        running = probe.listen(Float64MultiArray, "identifier/running_covariance")
+        early = probe.call("identifier/get_inertia")
+        assert not early.success
+        assert "nothing was identified" in early.message
+        empty = probe.call("identifier/identify_inertia")
+        assert not empty.success
+        assert "no window is complete" in empty.message
+        told = probe.listen(Float64MultiArray, "identifier/covariance")
+        graph.start("replay", f"session:={recorded}", "rate:=2.0", "operate:=identifier", "pause:=0.5")
+        states: list[str] = []
+
+        def hear(message: DiagnosticArray) -> None:
+            states.extend(s.message for s in message.status if s.name.startswith("replay:"))
+
+        probe.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 50)
+        probe.spin_until(lambda: states and states[-1] == "over", 60.0, "the end of the replay")
+        future = probe.begin("identifier/identify_inertia")
+        probe.spin_for(0.5)
+        second = probe.call("identifier/explain_mismatch")
+        assert not second.success
+        assert "busy: identify_inertia, run 1" in second.message
+        probe.spin_until(future.done, 120.0, "the fit")
+        answer = future.result()
+        assert answer.success, answer.message
+        result = json.loads(answer.message)
+        assert result["recordings"] == ["static_1", "static_2", "run_1"]
+        live = np.array(result["inertia"]["value"])[np.triu_indices(3)]
+        std = np.array(result["inertia"]["std"])[np.triu_indices(3)]
+        assert np.all(np.abs(live - offline.values[4:]) < 0.1 * std)
+        assert np.all(np.abs(live - BODY[4:]) < 3.0 * std)
+        center = np.array(result["center_of_mass"]["value"])
+        assert np.all(np.abs(center - BODY[1:4]) < 3.0 * np.array(result["center_of_mass"]["std"]))
+        again = probe.call("identifier/identify_center_of_mass", within=5.0)  # the same data: at once
+        assert json.loads(again.message)["center_of_mass"] == result["center_of_mass"]
+        late = probe.listen(InertiaStamped, "identifier/inertia", LATCHED)
+        probe.spin_until(lambda: late, 10.0, "the latched result")
+        assert np.allclose(ten_of(late[-1])[4:], live)
+        probe.spin_until(lambda: told, 5.0, "the covariance")
+        assert json.loads(probe.call("identifier/explain_mismatch").message)["mismatch"]["verdict"] == "none"
+        assert running, "no running estimate came while the window was open"
+        assert graph.end(identifier) == (0, "")
+        probe.close()
+    finally:
+        graph.close()
