@@ -14,7 +14,7 @@ from rig_identification.estimate.sampling import (
     interpolation,
     node_values,
     rate_of_change,
-    white_noise_std,
+    sample_noise_std,
 )
 
 GRID = Grid(0.01, 201)
@@ -102,9 +102,9 @@ def test_rate_of_change_of_a_swing() -> None:
 
 
 @pytest.mark.parametrize("std", [1e-4, 0.5, 20.0])
-def test_white_noise_is_told_from_motion(std: float) -> None:
+def test_noise_is_told_from_motion(std: float) -> None:
     rng = np.random.default_rng(2)
     time = 0.005 * np.arange(4000)
     motion = 500.0 * std * np.sin(2.0 * np.pi * 0.7 * time)
-    found = white_noise_std((motion + std * rng.normal(size=time.size))[:, None])
+    found = sample_noise_std(time, (motion + std * rng.normal(size=time.size))[:, None])
     assert found[0] == pytest.approx(std, rel=0.06)
