@@ -161,7 +161,9 @@ def test_the_wrench_is_newtons_and_eulers(flight: dict[str, np.ndarray]) -> None
 
 
 @pytest.mark.parametrize("integrate_only", [False, True])
-def test_the_tracker_holds_where_integration_drifts(flight: dict[str, np.ndarray], integrate_only: bool) -> None:
+def test_the_tracker_holds_where_integration_drifts(
+    flight: dict[str, np.ndarray], integrate_only: bool
+) -> None:
     rig, rng = make_rig(), np.random.default_rng(4)
     imu = imu_readings(rig, flight["rows"], rng)[::5]
     imu += np.array([0.0, 0.0, 0.0, 0.01, -0.015, 0.01])  # an accelerometer bias within its tolerance
@@ -179,7 +181,9 @@ def test_the_tracker_holds_where_integration_drifts(flight: dict[str, np.ndarray
         poses.append(tracked.pose)
         covariances.append(tracked.pose_covariance)
     error = np.concatenate(poses)[2000:] - truth[2000:, :7]
-    error *= np.where(np.sum(np.concatenate(poses)[2000:, 3:] * truth[2000:, 3:7], axis=1) < 0, np.nan, 1.0)[:, None]
+    error *= np.where(np.sum(np.concatenate(poses)[2000:, 3:] * truth[2000:, 3:7], axis=1) < 0, np.nan, 1.0)[
+        :, None
+    ]
     rms = np.sqrt(np.mean(error[:, :3] ** 2, axis=0))
     if integrate_only:
         assert np.max(rms) > 0.5

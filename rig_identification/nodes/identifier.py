@@ -119,9 +119,14 @@ class IdentifierNode(RigNode):
         self.running.listen(False)
         if self.windows.stop() is None:
             raise InputError(f"window {plan.name}: no message came on any topic; nothing was kept")
-        missing = [name for name, gate in self.intake.gates.items() if gate.received and not counts.get(name)]
+        missing = [name for name in self._expected() if not counts.get(name)]
         silent = f"; silent: {', '.join(missing)}" if missing else ""
         return f"window {plan.name}: {sum(counts.values())} messages on {len(counts)} topics{silent}"
+
+    def _expected(self) -> list[str]:
+        """Topics that a window should hold: every cable's, and what came at any time."""
+        gates, topics = self.intake.gates, self.intake.topics
+        return [name for name, gate in gates.items() if gate.received or topics[name].channel == "tension"]
 
     def _clear_windows(self) -> str:
         if self.windows.plan is not None or self.request is not None:

@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 
 from rig_identification.errors import RigIdentificationError
 from rig_identification.nodes.parameters import OwnParameter, OwnParameters
-from rig_identification.nodes.rig_parameters import rig_of
+from rig_identification.nodes.rig_parameters import refuse_misspelt, rig_of
 from rig_identification.rig import Rig
 
 #: The latest message stays for those who come later.
@@ -40,6 +40,7 @@ class RigNode(Node):
             automatically_declare_parameters_from_overrides=True,
         )
         self._own_names = [p.name for p in parameters]
+        refuse_misspelt(self, self._own_names)
         self.own = OwnParameters(self, parameters)
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.faults = 0  # errors that callbacks raised

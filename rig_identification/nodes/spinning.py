@@ -24,6 +24,9 @@ def spin(create: Callable[[], RigNode], stop: StopRequest, arguments: list[str] 
     InputError
         The node's parameters cannot be used.
     """
+    stop.notify = lambda: (
+        None
+    )  # from here on there is something to close: a signal is noted, and heeded below
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:

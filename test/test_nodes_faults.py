@@ -1,0 +1,285 @@
+"""What goes wrong on a rig, each with real processes: no node dies or hangs, no wrong number goes unsaid."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
+from node_processes import SIMULATOR, Graph, Probe
+from sensor_msgs.msg import Imu
+
+from rig_identification.session import read_session
+
+NODES = (
+    "rig_simulator", "load_cells", "imu", "inclinometer", "tracker", "preprocessor", "identifier", "recorder",
+)  # fmt: skip
+
+
+@pytest.fixture
+def graph(tmp_path: Path) -> Iterator[Graph]:
+    made = Graph(tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def probe(graph: Graph) -> Iterator[Probe]:
+    made = Probe(graph)
+    yield made
+    made.close()
+
+
+class Diagnostics:
+    """The latest line of each name on /diagnostics."""
+
+    def __init__(self, probe: Probe) -> None:
+        self.lines: dict[str, DiagnosticStatus] = {}
+        probe.node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 50)
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        self.lines.update({line.name: line for line in message.status})
+
+    def value(self, name: str, key: str) -> str:
+        line = self.lines.get(name)
+        return next((pair.value for pair in line.values if pair.key == key), "") if line else ""
+
+    def says(self, name: str, words: str) -> bool:
+        return name in self.lines and words in self.lines[name].message
+
+
+def simulated(graph: Graph, *others: str) -> dict[str, subprocess.Popen[str]]:
+    processes = {
+        "rig_simulator": graph.start("rig_simulator", *SIMULATOR),
+        "load_cells": graph.start("load_cells", "simulation.rate:=100.0"),
+        "imu": graph.start("imu", "simulation.rate:=100.0"),
+    }
+    return processes | {name: graph.start(name) for name in others}
+
+
+def has_taken_signals(process: subprocess.Popen[str]) -> bool:
+    """Whether the process handles SIGTERM itself (its mask of caught signals)."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    caught = int(next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), 16)
+    return bool(caught >> (signal.SIGTERM - 1) & 1)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("delay", [0.0, 0.6, 1.5])
+def test_a_signal_while_starting_ends_every_node_quietly(graph: Graph, number: int, delay: float) -> None:
+    """From the moment a node takes its signals, in the middle of imports, and shortly after."""
+    processes = [graph.start(name) for name in NODES]
+    end = time.monotonic() + 30.0
+    for process in processes:
+        while not has_taken_signals(process):
+            assert time.monotonic() < end
+            time.sleep(0.002)
+        if delay == 0.0:
+            process.send_signal(number)
+    if delay:
+        time.sleep(delay)
+    for name, process in zip(NODES, processes, strict=True):
+        assert (name, *graph.end(process, number)) == (name, 0, "")
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_recording_leaves_the_recording_whole(
+    graph: Graph, probe: Probe, number: int, storage: str
+) -> None:
+    simulated(graph)
+    folder = graph.folder / "session"
+    recorder = graph.start("recorder", f"folder:={folder}", f"storage:={storage}", "recording.kind:=dynamic")
+    heard = probe.listen(WrenchStamped, "cable_1/wrench")
+    assert probe.call("recorder/start").success
+    count = len(heard)
+    probe.spin_until(lambda: len(heard) > count + 200, 30.0, "two seconds of data")
+    recorder.send_signal(number)
+    recorder.send_signal(number)  # an impatient operator
+    assert graph.end(recorder, number) == (0, "")
+    (run,) = read_session(folder).recordings
+    quality = {q.topic: q for q in run.quality}
+    assert quality["/rig/cable_1/wrench"].used > 150
+    assert quality["/rig/cable_1/wrench"].missing == 0
+
+
+def test_a_signal_while_fitting_ends_fit_and_node(graph: Graph, probe: Probe) -> None:
+    simulated(graph)
+    identifier = graph.start("identifier", "recording.kind:=static")
+    heard = probe.listen(WrenchStamped, "cable_1/wrench")
+    probe.spin_until(lambda: heard, 30.0, "the sensors")
+    assert probe.call("identifier/start_window").success
+    probe.spin_for(1.0)
+    assert probe.call("identifier/stop_window").success
+    probe.begin("identifier/identify_center_of_mass")
+    children = Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children")
+    probe.spin_until(lambda: children.read_text().split(), 10.0, "the fit's process")
+    (child,) = children.read_text().split()
+    assert graph.end(identifier, signal.SIGTERM) == (0, "")
+    assert not Path(f"/proc/{child}").exists()
+
+
+def test_a_sensor_killed_and_restarted_leaves_a_gap_with_a_name(graph: Graph, probe: Probe) -> None:
+    nodes = simulated(graph)
+    folder = graph.folder / "session"
+    recorder = graph.start("recorder", f"folder:={folder}")
+    diagnostics = Diagnostics(probe)
+    heard = probe.listen(Imu, "imu/data_raw")
+    probe.spin_until(lambda: len(heard) > 50, 30.0, "the imu")
+    assert probe.call("recorder/start").success
+    probe.spin_for(1.0)
+    nodes["imu"].kill()
+    line = "recorder: /rig/imu/data_raw"
+    probe.spin_until(lambda: diagnostics.says(line, "silent"), 10.0, "the word of silence")
+    count = len(heard)
+    graph.start("imu", "simulation.rate:=100.0")
+    probe.spin_until(lambda: len(heard) > count + 100, 20.0, "the imu again")
+    answer = probe.call("recorder/stop")
+    assert answer.success, answer.message
+    quality = {q.topic: q for q in read_session(folder).recordings[0].quality}
+    assert quality["/rig/imu/data_raw"].gaps == 1
+    assert quality["/rig/imu/data_raw"].longest_gap > 1.0
+    assert quality["/rig/cable_1/wrench"].missing == 0
+    assert graph.end(recorder) == (0, "")
+
+
+def test_a_node_started_twice_and_one_started_late_are_named(graph: Graph, probe: Probe) -> None:
+    simulated(graph)
+    graph.start("imu", "simulation.rate:=100.0", "simulation.seed:=7")
+    diagnostics = Diagnostics(probe)
+    heard = probe.listen(Imu, "imu/data_raw")
+    probe.spin_until(lambda: len(heard) > 50, 30.0, "the imu")
+    late = graph.start("identifier")
+    probe.spin_until(
+        lambda: diagnostics.says("identifier: /rig/imu/data_raw", "2 publishers"), 20.0, "the word"
+    )
+    probe.spin_until(lambda: diagnostics.says("/rig/imu", "two nodes of this name"), 10.0, "the nodes' word")
+    assert graph.end(late) == (0, "")
+
+
+def test_a_silent_cable_and_a_still_window_are_said(graph: Graph, probe: Probe) -> None:
+    graph.start("rig_simulator", *SIMULATOR)
+    graph.start("load_cells", "simulation.rate:=100.0", remaps=["cable_3/wrench:=elsewhere"])
+    graph.start("imu", "simulation.rate:=100.0")
+    identifier = graph.start("identifier", "recording.kind:=dynamic")
+    heard = probe.listen(WrenchStamped, "cable_1/wrench")
+    probe.spin_until(lambda: heard, 30.0, "the sensors")
+    assert probe.call("identifier/start_window").success
+    probe.spin_for(2.5)
+    stopped = probe.call("identifier/stop_window")
+    assert stopped.success
+    assert "silent: /rig/cable_3/wrench" in stopped.message
+    answer = probe.call("identifier/identify_inertia", within=60.0)
+    assert not answer.success
+    assert "run_1: the body does not move" in answer.message
+    assert not probe.call("identifier/get_inertia").success
+    assert graph.end(identifier) == (0, "")
+
+
+def test_odd_stamps_and_numbers_are_refused_and_counted(graph: Graph, probe: Probe) -> None:
+    """Backwards, zero, from the future, NaN: on a cable and on the IMU, while tracker and window run."""
+    simulated(graph)
+    tracker, identifier = graph.start("tracker"), graph.start("identifier")
+    diagnostics = Diagnostics(probe)
+    poses = probe.listen(Odometry, "odometry")
+    probe.spin_until(lambda: len(poses) > 100, 40.0, "the tracker")
+    cable = probe.node.create_publisher(WrenchStamped, "cable_2/wrench", 10)
+    imu = probe.node.create_publisher(Imu, "imu/data_raw", 10)
+    probe.spin_until(lambda: cable.get_subscription_count() >= 2 and imu.get_subscription_count() >= 2, 10.0)
+    assert probe.call("identifier/start_window").success
+    now = time.time()
+    for second, number in ((0, 1.0), (now - 100, 9e9), (now + 3600, 9e9), (now + 0.2, float("nan"))):
+        for publisher, message in ((cable, WrenchStamped()), (imu, Imu())):
+            message.header.stamp.sec = int(second)
+            message.header.stamp.nanosec = int(second % 1 * 1e9)
+            if isinstance(message, WrenchStamped):
+                message.wrench.force.z = number
+            else:
+                message.linear_acceleration.z = number
+            publisher.publish(message)
+    line = "identifier: /rig/cable_2/wrench"
+    keys = ("zero", "backward", "ahead", "not_finite")
+    probe.spin_until(
+        lambda: all(int(diagnostics.value(line, key) or 0) >= 1 for key in keys),
+        10.0,
+        "the account of oddities",
+    )
+    count = len(poses)
+    probe.spin_until(lambda: len(poses) > count + 100, 10.0, "tracking that goes on")
+    after = np.array([[p.pose.pose.position.x, p.pose.pose.position.z] for p in poses[-50:]])
+    before = np.array([[p.pose.pose.position.x, p.pose.pose.position.z] for p in poses[count - 50 : count]])
+    assert np.max(np.abs(after.mean(axis=0) - before.mean(axis=0))) < 0.005  # the body hangs still
+    assert probe.call("identifier/stop_window").success
+    assert graph.end(tracker) == (0, "")
+    assert graph.end(identifier) == (0, "")
+
+
+def test_a_client_that_dies_while_it_waits_harms_no_one(graph: Graph, probe: Probe) -> None:
+    simulated(graph)
+    identifier = graph.start("identifier", "recording.kind:=static")
+    heard = probe.listen(WrenchStamped, "cable_1/wrench")
+    probe.spin_until(lambda: heard, 30.0, "the sensors")
+    assert probe.call("identifier/start_window").success
+    probe.spin_for(1.0)
+    assert probe.call("identifier/stop_window").success
+    client = (
+        "import os, rclpy; from std_srvs.srv import Trigger; rclpy.init(); n = rclpy.create_node('client');"
+        "c = n.create_client(Trigger, '/rig/identifier/identify_center_of_mass'); c.wait_for_service(20.0);"
+        "f = c.call_async(Trigger.Request()); rclpy.spin_once(n, timeout_sec=0.3);"
+        "print('asked', flush=True);"
+        "os.kill(os.getpid(), 9)"
+    )
+    environment = {
+        **os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }  # fmt: skip
+    ended = subprocess.run([sys.executable, "-c", client], env=environment, capture_output=True, text=True)
+    assert ended.stdout == "asked\n"
+    diagnostics = Diagnostics(probe)
+    probe.spin_until(
+        lambda: diagnostics.says("identifier: windows", "identify_center_of_mass, run 1"), 10.0, "the fit"
+    )
+    busy = probe.call("identifier/identify_inertia")
+    assert "busy: identify_center_of_mass, run 1" in busy.message
+    assert "is cancelled" in probe.call("identifier/cancel").message
+    assert "no window is open" in probe.call("identifier/stop_window").message
+    assert graph.end(identifier) == (0, "")
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_full_disk_ends_a_recording_in_good_order(graph: Graph, probe: Probe, storage: str) -> None:
+    disk = graph.folder / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=5m", "tmpfs", str(disk)], capture_output=True
+    )
+    if mounted.returncode:
+        pytest.skip("a small disk cannot be mounted without privileges: " + mounted.stderr.decode().strip())
+    try:
+        simulated(graph)
+        graph.start("inclinometer", "simulation.rate:=4000.0")
+        recorder = graph.start("recorder", f"folder:={disk / 'session'}", f"storage:={storage}")
+        diagnostics = Diagnostics(probe)
+        assert probe.call("recorder/start").success
+        probe.spin_until(
+            lambda: diagnostics.says("recorder: recording", "free the disk"), 40.0, "a full disk"
+        )
+        stopped = probe.call("recorder/stop")
+        assert not stopped.success
+        assert "recording run_1 ended" in stopped.message
+        (run,) = read_session(disk / "session").recordings
+        assert run.duration > 1.0
+        assert graph.end(recorder)[0] == 0
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)

@@ -1,0 +1,164 @@
+"""Sensor nodes on a serial line that is pulled out and on a logger's file; refusals by name; one command."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
+pytest.importorskip("serial", reason="pyserial is not installed: pip install '.[ros]'")
+
+from geometry_msgs.msg import Vector3Stamped, WrenchStamped
+from node_processes import ROOT, Graph, Probe
+from sensor_msgs.msg import Imu
+
+from rig_identification.session import read_session
+
+
+@pytest.fixture
+def graph(tmp_path: Path) -> Iterator[Graph]:
+    made = Graph(tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def probe(graph: Graph) -> Iterator[Probe]:
+    made = Probe(graph)
+    yield made
+    made.close()
+
+
+class Amplifier:
+    """Sends a line each 10 ms over a pseudo-terminal that stands at ``port``."""
+
+    def __init__(self, port: Path, line: bytes) -> None:
+        self._master, slave = pty.openpty()
+        self._slave = slave
+        port.unlink(missing_ok=True)
+        port.symlink_to(os.ttyname(slave))
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._send, args=(line,))
+        self._thread.start()
+
+    def _send(self, line: bytes) -> None:
+        while not self._ending.wait(0.01):
+            os.write(self._master, line)
+
+    def unplug(self) -> None:
+        self._ending.set()
+        self._thread.join()
+        os.close(self._master)
+        os.close(self._slave)
+
+
+def test_a_serial_amplifier_is_read_unplugged_and_plugged_in_again(graph: Graph, probe: Probe) -> None:
+    port = graph.folder / "ttyUSB0"
+    amplifier = Amplifier(port, b"7;1.0;2.0;3.0;4.0;5.0;6.0;-7.5\r\n12;nonsense\r\n")
+    node = graph.start(
+        "load_cells", "source:=serial", f"serial.port:={port}", "line.separator:=';'",
+        "line.columns:=[1, 2, 3, 4, 5, 6, 7]", "line.scale:=[1000.0]", "line.offset:=[0.5]",
+    )  # fmt: skip
+    cable, exciter = (
+        probe.listen(WrenchStamped, "cable_4/wrench"),
+        probe.listen(WrenchStamped, "exciter/wrench"),
+    )
+    probe.spin_until(lambda: len(cable) > 50 and len(exciter) > 50, 20.0, "the amplifier's lines")
+    assert cable[-1].wrench.force.z == pytest.approx(4000.5)
+    assert [getattr(exciter[-1].wrench.force, axis) for axis in "xyz"] == pytest.approx(
+        [5000.5, 6000.5, -7499.5]
+    )
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in cable]
+    assert all(b > a for a, b in itertools.pairwise(stamps))
+    assert abs(stamps[-1] - time.time_ns()) < 2e9
+    amplifier.unplug()
+    probe.spin_for(1.0)
+    count = len(cable)
+    amplifier = Amplifier(port, b"7;1.5;2.0;3.0;4.25;5.0;6.0;-7.5\r\n")
+    probe.spin_until(lambda: len(cable) > count + 50, 10.0, "the amplifier's return")
+    assert cable[-1].wrench.force.z == pytest.approx(4250.5)
+    assert graph.end(node) == (0, "")
+    amplifier.unplug()
+
+
+def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> None:
+    file = graph.folder / "logger.csv"
+    rows = [f"{1000 + 20 * k},{0.001 * k},{-0.002 * k}" for k in range(150)]
+    file.write_text("time ms,x,y\n" + "\n".join(rows) + "\n")
+    angles = probe.listen(Vector3Stamped, "inclinometer/angles")
+    graph.start(
+        "inclinometer", "source:=file", f"file.path:={file}", "line.time_column:=0", "line.time_scale:=0.001",
+        "line.columns:=[1, 2]",
+    )  # fmt: skip
+    probe.spin_until(lambda: len(angles) > 10, 20.0, "the file's first lines")
+    begun = time.monotonic()
+    probe.spin_until(lambda: angles[-1].vector.x > 0.1485, 10.0, "the file's last line")
+    assert time.monotonic() - begun > 1.5  # 3 s of file, some of them over before
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in angles]
+    assert {b - a for a, b in itertools.pairwise(stamps)} == {20_000_000}
+    assert angles[-1].vector.y == pytest.approx(-2.0 * angles[-1].vector.x)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "words"),
+    [
+        ("imu", "source:=bluetooth", "parameter source: 'bluetooth' is unknown; give simulation or"),
+        ("imu", "simulation.rate:=0.0", "parameter simulation.rate: 0.0 Hz is not within 1 and 10000 Hz"),
+        ("load_cells", "source:=serial", "parameter serial.port: is empty"),
+        ("tracker", "cable_2.length:=-2.0", "cable_2.length: -2 m must be above 0 m"),
+        ("tracker", "marker_rat:=9.8", "parameter marker_rat: unknown; did you mean marker_rate?"),
+        ("rig_simulator", "speed:=4.0", "parameter publish_clock"),
+        ("rig_simulator", "body.inertia:=[1.0, 0.0, 0.0, 1.0, 0.0, 900.0]", "no body has"),
+        ("replay", "session:=/nowhere", "/nowhere: session does not exist"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused_by_name(graph: Graph, name: str, parameter: str, words: str) -> None:
+    process = graph.start(name, parameter)
+    output, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 2
+    assert words in output
+    assert output.count("\n") == 1
+
+
+def test_a_parameter_set_while_running_is_checked(graph: Graph, probe: Probe) -> None:
+    recorder = graph.start("recorder")
+    (reason,) = probe.set("recorder", recording__kind="dynmic")
+    assert reason == "recording.kind: 'dynmic' is unknown; give static or dynamic"
+    (reason,) = probe.set("recorder", storage="sqlite3")
+    assert reason == "storage is read when the node starts"
+    assert probe.set("recorder", recording__kind="static", recording__dummy_mass=50) == []
+    assert graph.end(recorder) == (0, "")
+
+
+def test_one_command_brings_the_simulated_rig_up_and_down(graph: Graph, probe: Probe) -> None:
+    folder = graph.folder / "session"
+    command = [
+        sys.executable, "-m", "rig_identification.cli.main", "rig", "simulated", "--without", "identifier",
+        "--set", f"recorder.folder={folder}", "--set", "recorder.record_at_start=true",
+        "--set", "rig_simulator.shake.at_start=true", "--set", "imu.simulation.rate=100",
+    ]  # fmt: skip
+    environment = {
+        **os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "PYTHONPATH": str(ROOT),
+    }  # fmt: skip
+    process = subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    graph.processes.append(process)
+    heard = probe.listen(Imu, "imu/data_raw")
+    probe.spin_until(lambda: len(heard) > 200, 60.0, "the simulated rig")
+    assert graph.end(process, signal.SIGINT, within=40.0) == (0, "")
+    (run,) = read_session(folder).recordings
+    assert len(run.tension) == 4
+    assert run.exciter_force is not None
+    assert run.exciter_force.values.std(axis=0).max() > 10.0
