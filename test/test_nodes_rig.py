@@ -110,11 +110,9 @@ def test_the_recorder_lost_no_sample(recorded: Path) -> None:
             assert (quality.missing, quality.duplicated, quality.backward) == (0, 0, 0), quality
     assert session.rig.cables[1].length == 2.034
 
-    """Windows of a replay give what the offline estimate gives; by service, within 3 deviations of the truth."""
-
 
 def test_a_session_replayed_gives_the_same_inertia_as_read_from_disk(recorded: Path, tmp_path: Path) -> None:
-    """Windows of a replay against the offline estimate: equal; by service within 3 deviations of the truth."""
+    """Windows of a replay and the offline estimate agree; so does, within 3 deviations, the truth."""
     offline = identify(read_session(recorded)).total
     graph = Graph(tmp_path)
     try:
