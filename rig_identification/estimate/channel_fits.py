@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Channel, Run
-from rig_identification.estimate.prediction import Linearised
+from rig_identification.estimate.prediction import Linearised, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
 from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
-from rig_identification.estimate.whitening import smooth
 from rig_identification.result import ChannelFit
 
 Array = NDArray[np.float64]
@@ -21,17 +20,7 @@ def node_corrections(linearised: Linearised) -> Array | None:
     motion = linearised.motion
     if not np.any(linearised.Q) or motion.H is None or motion.D is None:
         return None
-    states, wrenches, _ = smooth(
-        motion.A,
-        motion.B,
-        linearised.Q,
-        linearised.nodes,
-        linearised.row_H,
-        linearised.row_D,
-        linearised.variance,
-        linearised.plain,
-        np.zeros((12, 12)),
-    )
+    states, wrenches, _ = smoothed(linearised)
     return np.asarray(np.einsum("nij,nj->ni", motion.H, states) + np.einsum("nij,nj->ni", motion.D, wrenches))
 
 
@@ -52,11 +41,11 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
         late = _clock(problem, theta, channel.device)
         each = np.arange(channel.time.size)
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
-        fits += _axes(run.recording.name, channel, np.asarray(value @ nodes))
+        fits += _axes(run.recording.name, channel, np.asarray(value @ nodes), run.offset)
     return fits
 
 
-def _axes(recording: str, channel: Channel, predicted: Array) -> list[ChannelFit]:
+def _axes(recording: str, channel: Channel, predicted: Array, offset: float) -> list[ChannelFit]:
     return [
         ChannelFit(
             recording,
@@ -66,7 +55,7 @@ def _axes(recording: str, channel: Channel, predicted: Array) -> list[ChannelFit
             channel.unit,
             float(channel.noise[a]),
             channel.noise_estimated,
-            channel.time,
+            channel.time + offset,
             channel.values[:, a],
             predicted[:, a],
         )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.estimate.sampling import Grid, group_by_node, white_noise_std
+from rig_identification.estimate.sampling import Grid, group_by_node, sample_noise_std
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
 
@@ -65,7 +65,8 @@ class Run:
     exciter: Series | None
     exciter_noise: float  # N, one sample
     exciter_rate: float  # Hz
-    R_tracker_mean: Array | None = None  # (3, 3) see sensors.MocapMount
+    R_tracker_mean: Array | None = None  # (3, 3) see sensors.mocap
+    offset: float = 0.0  # s after the recording's start at which node 0 lies
 
     def until(self, end: float) -> Run:
         """The same run, cut off at ``end`` seconds."""
@@ -91,15 +92,17 @@ class Run:
             # Two extra intervals on either side, so that the input's spline feels no edge
             near = (exciter.time >= shift - 2 * grid.step) & (exciter.time <= shift + grid.duration + 2 * grid.step)
             exciter = Series(exciter.time[near] - shift, exciter.values[near]) if np.any(near) else None
-        return replace(self, grid=grid, channels=tuple(cut), exciter=exciter)
+        return replace(
+            self, grid=grid, channels=tuple(cut), exciter=exciter, offset=self.offset + shift
+        )
 
 
-def _noise(rig: Rig, name: str, values: Array) -> tuple[Array, bool]:
+def noise_std(rig: Rig, name: str, time: Array, values: Array) -> tuple[Array, bool]:
+    """(std of one sample (w,), whether it was estimated): described, or read off the samples themselves."""
     width = values.shape[1]
     if name in rig.noise:
         return np.full(width, rig.noise[name]), False
-    pooled = np.sqrt(np.mean(white_noise_std(values) ** 2))
-    return np.full(width, max(float(pooled), 1e-9)), True
+    return np.maximum(sample_noise_std(time, values), 1e-9), True
 
 
 def _channel(
@@ -109,7 +112,7 @@ def _channel(
     if np.count_nonzero(inside) < 5:
         return None
     time, values = series.time[inside], series.values[inside]
-    std, estimated = _noise(rig, noise, values)
+    std, estimated = noise_std(rig, noise, time, values)
     group, node = group_by_node(grid, time)
     return Channel(device, quantity, columns, unit, time, values, std, estimated, group, node)
 
@@ -152,7 +155,8 @@ def prepare(rig: Rig, recording: Recording) -> Run:
     exciter = recording.exciter_force if rig.exciter is not None else None
     noise, rate = 0.0, 1.0
     if exciter is not None and exciter.time.size > 8:
-        noise = float(_noise(rig, "exciter_force", exciter.values)[0][0])
+        std, _ = noise_std(rig, "exciter_force", exciter.time, exciter.values)
+        noise = float(np.sqrt(np.mean(std**2)))
         rate = 1.0 / float(np.median(np.diff(exciter.time)))
     else:
         exciter = None

@@ -10,7 +10,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.model import sensors
 from rig_identification.model.equilibrium import design_pose, settle
 from rig_identification.model.motion import RigModel, State, on_cables
-from rig_identification.recording import Recording, Session
+from rig_identification.recording import Session
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -71,34 +71,72 @@ def rest_of(model: RigModel) -> State:
     return settle(model, design_pose(model))
 
 
-def mocap_mount(rig: Rig, recording: Recording, rest: State, R_tracker_mean: Array, heading: float) -> sensors.MocapMount:
-    """Mounts under which the mean recorded pose is the rest pose, the tracker's z up and turned by ``heading``."""
-    if recording.mocap is None:
-        raise ValueError("the recording holds no motion capture")
-    mean_position = np.mean(recording.mocap.values[:, :3], axis=0)
-    R_tracker_world = Rotation.from_rotvec([0.0, 0.0, heading]).as_matrix()
+def headings(rig: Rig, run: Run) -> list[float]:
+    """Candidate angles (rad) of world x about the tracker's z.
+
+    A body on two cables tilts about the line e of its hinges as it swings across it: the
+    horizontal rotation follows the displacement as r = e (n . d)/h, n = z x e, so that e is the
+    left singular vector of the regression of r on d (its sign stays open). Otherwise a
+    round of eight.
+    """
+    if rig.mocap is not None:
+        return [0.0]
+    channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
+    if len(rig.cables) > 2 or run.R_tracker_mean is None or len(channels) < 2:
+        return [float(a) for a in np.arange(8) * np.pi / 4]
+    place, turn = channels["position"], channels["orientation"]
+    # Rotation in tracker axes: the mean orientation carries the vector about it there
+    r = (turn.values @ run.R_tracker_mean.T)[:, :2]
+    d = np.stack([np.interp(turn.time, place.time, place.values[:, i]) for i in range(2)], axis=1)
+    r, d = r - np.mean(r, axis=0), d - np.mean(d, axis=0)
+    slope = np.linalg.lstsq(d, r, rcond=None)[0].T
+    e = np.linalg.svd(slope)[0][:, 0]
+    along = rig.cables[1].body_point - rig.cables[0].body_point
+    angle = np.arctan2(e[1], e[0]) - np.arctan2(along[1], along[0])
+    return [float(angle), float(angle + np.pi)]
+
+
+def mocap_mount(rig: Rig, run: Run, rest: State, heading: float) -> sensors.MocapMount:
+    """Mounts under which the mean recorded pose is the rest pose.
+
+    Where the marker's mount is not described, the tracker's z is taken to be up, turned by
+    ``heading`` (rad) about it, and the marker to sit at the datum: a start for the fit.
+    """
+    place = next(c for c in run.channels if c.device == "mocap" and c.quantity == "position")
+    if run.R_tracker_mean is None:
+        raise ValueError("the run holds no motion capture")
+    mean_position = np.mean(place.values, axis=0)
     if rig.mocap is not None:
         R_body_marker = Rotation.from_quat(rig.mocap.orientation).as_matrix()
         marker = rig.mocap.position
-        R_tracker_world = R_tracker_mean @ R_body_marker.T @ rest.R_world_body.T
+        R_tracker_world = run.R_tracker_mean @ R_body_marker.T @ rest.R_world_body.T
     else:
-        R_body_marker = (R_tracker_world @ rest.R_world_body).T @ R_tracker_mean
+        R_tracker_world = Rotation.from_rotvec([0.0, 0.0, heading]).as_matrix()
+        R_body_marker = (R_tracker_world @ rest.R_world_body).T @ run.R_tracker_mean
         marker = np.zeros(3)
     world = mean_position - R_tracker_world @ (rest.position + rest.R_world_body @ marker)
-    return sensors.MocapMount(marker, R_body_marker, world, R_tracker_world, R_tracker_mean)
+    return sensors.MocapMount(marker, R_body_marker, world, R_tracker_world)
 
 
-def start_from_mocap(model: RigModel, run: Run, mount: sensors.MocapMount, span: float = 0.25) -> State:
-    """Pose and velocity at time 0 from straight lines through the first ``span`` seconds of motion capture."""
-    place = next(c for c in run.channels if c.device == "mocap" and c.quantity == "position")
-    turn = next(c for c in run.channels if c.device == "mocap" and c.quantity == "orientation")
+def start_from_mocap(
+    model: RigModel, run: Run, mount: sensors.MocapMount, device: Array, span: float = 0.2
+) -> State | None:
+    """Pose and velocity at time 0 from straight lines through the first ``span`` seconds; None without motion capture.
+
+    device (12,): current errors of the mount (model/sensors.py).
+    """
+    channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
+    if "position" not in channels or "orientation" not in channels or run.R_tracker_mean is None:
+        return None
+    place, turn = channels["position"], channels["orientation"]
     early = place.time <= place.time[0] + span
     line = np.polynomial.polynomial.polyfit(place.time[early], place.values[early], 1)
     spin = np.polynomial.polynomial.polyfit(turn.time[early], turn.values[early], 1)
-    R_tracker_body = mount.R_tracker_mean @ Rotation.from_rotvec(spin[0]).as_matrix() @ mount.R_body_marker.T
-    R = mount.R_tracker_world.T @ R_tracker_body
-    rate = mount.R_body_marker @ spin[1]
-    marker = mount.R_tracker_world.T @ (line[0] - mount.world_position)
-    arm = R @ mount.marker_position
-    velocity = mount.R_tracker_world.T @ line[1] - np.cross(R @ rate, arm)
-    return on_cables(model, State(marker - arm, R, velocity, rate))
+    R_bm = Rotation.from_rotvec(device[3:6]).as_matrix() @ mount.R_body_marker
+    R_tw = Rotation.from_rotvec(device[9:12]).as_matrix() @ mount.R_tracker_world
+    R_tracker_body = run.R_tracker_mean @ Rotation.from_rotvec(spin[0]).as_matrix() @ R_bm.T
+    R = R_tw.T @ R_tracker_body
+    rate = R_bm @ spin[1]
+    arm = R @ (mount.marker_position + device[0:3])
+    marker = R_tw.T @ (line[0] - mount.world_position - device[6:9])
+    return on_cables(model, State(marker - arm, R, R_tw.T @ line[1] - np.cross(R @ rate, arm), rate))

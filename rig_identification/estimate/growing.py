@@ -8,8 +8,10 @@ the shorter one's result, whose remaining error is already far inside the next b
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, Linearised
 from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, shortened, solve
 from rig_identification.model.motion import State
@@ -17,6 +19,8 @@ from rig_identification.model.motion import State
 #: First horizon (s) and growth: about a period of such a rig, then fourfold.
 FIRST_HORIZON = 2.0
 GROWTH = 4.0
+#: Share of the weak prior's std within which short horizons may move the body from its first guess.
+HOLD = 0.1
 
 
 def horizons(duration: float) -> list[float]:
@@ -34,14 +38,18 @@ def solve_growing(
     """Fit over growing horizons; (evaluation over everything, whether the last one converged)."""
     duration = max((run.grid.duration for run in problem.runs), default=0.0)
     ends = horizons(duration) if problem.runs else [0.0]
+    guess = point.theta[:INERTIAL].copy()
     for i, end in enumerate(ends):
         whole = i == len(ends) - 1
-        part = problem if whole else shortened(problem, end)
+        part = problem
+        if not whole:
+            # A short horizon must not throw away what the guess knows: the body stays near it
+            part = replace(shortened(problem, end), weak_center=guess, weak=HOLD * problem.weak)
         # A short horizon needs no polish: the next one moves everything again
         evaluation, converged = solve(
             part,
             point,
-            iterations=30 if whole else 8,
+            iterations=15 if whole else 8,
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else lambda k, cost, e=end: notify(e / max(duration, 1e-9), f"first {e:.1f} s, step {k + 1}"),
         )

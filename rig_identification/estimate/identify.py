@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
+from rig_identification.estimate.cautious import solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
@@ -18,10 +19,12 @@ from rig_identification.estimate.observability import inertial_estimate, invert_
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench, Linearised
 from rig_identification.estimate.rest_evidence import prepare_rest
-from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.scan import scan
+from rig_identification.estimate.segments import free_part, solve_in_pieces
+from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.without_frame import subtract_frame
-from rig_identification.model.motion import rig_model
+from rig_identification.model.motion import State, rig_model
 from rig_identification.recording import Session
 from rig_identification.result import Identification, ParameterEstimate
 
@@ -39,8 +42,10 @@ class Fitted:
     problem: Problem
     evaluation: Evaluation
     converged: bool
+    rest: State  # pose at rest, roughly
     holdout_runs: tuple[Run, ...]
     holdouts: tuple[Linearised, ...]
+    notes: tuple[str, ...] = ()
 
 
 def _silent(stage: str, fraction: float) -> None:
@@ -74,30 +79,90 @@ def pose_problem(session: Session) -> tuple[Problem, Array, tuple[Run, ...]]:
     return problem, theta, held
 
 
+@dataclass(frozen=True)
+class Start:
+    """Where the fit of a session starts, and the free parts of its runs."""
+
+    problem: Problem
+    point: Point
+    rest: State
+    held: tuple[Run, ...]
+    notes: tuple[str, ...] = ()
+
+
+def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
+    """From rest, then from momentum: sessions whose tensions or IMU are recorded."""
+    launch = Launch(problem, theta).from_rest()
+    progress("first guess from momentum", 0.05)
+    launch = launch.from_momentum()
+    if launch.rest is None:
+        raise AssertionError("from_rest finds a pose")
+    return Start(problem, launch.point(), launch.rest, held)
+
+
+def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) -> Start | None:
+    """From a scan, then from the free parts of the runs: sessions that only watch a body swing."""
+    progress("scanning inertia and depth", 0.05)
+    found = scan(problem, problem.runs[0])
+    if found is None:
+        return None
+    problem = replace(found.problem, runs=problem.runs)
+    progress("looking for the free part of each run", 0.2)
+    half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
+    _, pieces, _ = solve_in_pieces(half, found.theta, found.rest, (found.rest,) * len(problem.rests))
+    theta, notes = pieces.point.theta, []
+    free: dict[str, Run] = {}
+    for run in (*problem.runs, *held):
+        part = free_part(problem, run, theta, found.rest)
+        free[run.recording.name] = part.run
+        if part.held:
+            notes.append(
+                f"{run.recording.name}: used from {part.start:.1f} to {part.end:.1f} s; before or after that "
+                f"the body does not move freely ({', '.join(f'{a:.1f} to {b:.1f} s' for a, b in part.held)})"
+            )
+    runs = tuple(free[run.recording.name] for run in problem.runs)
+    starts = tuple(launch_state(problem.bench, run, theta, found.rest) for run in runs)
+    point = Point(theta, starts, (found.rest,) * len(problem.rests))
+    held = tuple(free[run.recording.name] for run in held)
+    return Start(replace(problem, runs=runs), point, found.rest, held, tuple(notes))
+
+
+def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
+    """The way to a first guess that the session's sensors allow."""
+    devices = {c.device for run in problem.runs for c in run.channels}
+    forces = devices & set(problem.bench.parameters.places.cables)
+    if problem.runs and not forces and "imu" not in devices:
+        watched = _watched_start(problem, held, progress)
+        if watched is not None:
+            return watched
+    return _measured_start(problem, theta, held, progress)
+
+
 def fit_session(session: Session, progress: Progress = _silent) -> Fitted:
     """Fit the ideal model to a session and predict its held-out runs."""
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session)
-    start = Launch(problem, theta)
-    start = start.from_rest()
-    progress("first guess from momentum", 0.05)
-    start = start.from_momentum()
+    start = start_of(problem, theta, held, progress)
     evaluation, converged = solve_growing(
-        problem, start.point(), notify=lambda fraction, text: progress(f"fit: {text}", 0.15 + 0.6 * fraction)
+        start.problem,
+        start.point,
+        notify=lambda fraction, text: progress(f"fit: {text}", 0.15 + 0.45 * fraction),
     )
-    progress("predicting held-out runs", 0.8)
+    progress("predicting held-out runs", 0.6)
     outcomes = []
-    for run in held:
-        state = start.rest if start.rest is None else launch_state(problem.bench, run, evaluation.point.theta, start.rest)
-        result = fit_start_growing(problem.bench, run, evaluation.point.theta, state)
+    for run in start.held:
+        state = launch_state(start.problem.bench, run, evaluation.point.theta, start.rest)
+        result = fit_start_growing(start.problem.bench, run, evaluation.point.theta, state)
         if result is not None:
             outcomes.append((run, result[0]))
     return Fitted(
-        problem,
+        start.problem,
         evaluation,
         converged,
+        start.rest,
         tuple(run for run, _ in outcomes),
         tuple(linearised for _, linearised in outcomes),
+        start.notes,
     )
 
 
@@ -121,7 +186,6 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     notify = progress or _silent
     fitted = fit_session(session, notify)
     problem, evaluation = fitted.problem, fitted.evaluation
-    total = inertial_estimate(problem, evaluation)
     frame = session.rig.frame
     fits = []
     for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
@@ -135,6 +199,18 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     holdout_error = error_in_sigma(held_fits) if held_fits else None
     parameters = parameter_estimates(problem, evaluation)
     mismatch = judge(fitted, parameters, holdout_error, training_error, ORDINARY)
+    total, notes = inertial_estimate(problem, evaluation), fitted.notes
+    if mismatch.verdict == "unexplained" and problem.runs:
+        notify("fitting in short pieces, each channel weighed by its residual", 0.75)
+        parts, careful, _ = solve_cautiously(
+            problem, evaluation.point.theta, fitted.rest, evaluation.point.rest_guesses
+        )
+        total = inertial_estimate(parts, careful)
+        notes += (
+            "The ideal model does not explain these recordings. The ten numbers come from a fit in short "
+            "pieces that weighs each channel by its own residual; their intervals hold what the model lacks "
+            "only as far as the residuals show it.",
+        )
     notify("done", 1.0)
     return Identification(
         total=total,
@@ -145,6 +221,7 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
         holdout_error=holdout_error,
         training_error=training_error,
         converged=fitted.converged,
+        notes=notes,
     )
 
 

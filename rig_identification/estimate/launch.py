@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.first_guess import extent, rest_of
+from rig_identification.estimate.first_guess import extent, rest_of, start_from_mocap
 from rig_identification.estimate.momentum import balance, regress
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.rest_evidence import coarsened
 from rig_identification.estimate.solve import Point, Problem, fit_start, solve
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
-from rig_identification.model import layout
+from rig_identification.model import layout, sensors
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -92,6 +92,11 @@ def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array
     """Start state of a run: within a fifth of the cables' length of rest, by its first second."""
     length = float(np.mean([cable.length for cable in bench.rig.cables]))
     start = rest
+    if bench.mocap is not None:
+        first = bench.parameters.places.mocap
+        errors = bench.parameters.device(theta)[first : first + sensors.MOCAP_SIZE]
+        seen = start_from_mocap(model_at(bench.parameters, theta), run, bench.mocap, errors)
+        start = rest if seen is None else seen
     for end in LAUNCHES:
         found = fit_start(
             bench, run.until(end), theta, start, tolerance=1e-2, extra_noise=noise, spread=0.2 * length

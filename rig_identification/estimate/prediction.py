@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
 from rig_identification.estimate.sampling import interpolation, node_values, rate_of_change
-from rig_identification.estimate.whitening import whiten
+from rig_identification.estimate.whitening import smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
 from rig_identification.model.motion import FIT_STEP, Input, Motion, RigModel, State, simulate, substeps_for
@@ -44,8 +44,11 @@ def drive(run: Run, parameters: ParameterSet, theta: Array) -> Input:
     if run.exciter is None:
         return quiet
     late = parameters.device(theta)[parameters.places.exciter_clock]
-    force = node_values(run.grid, run.exciter.time - late, run.exciter.values)
-    return Input(run.grid.step, force, rate_of_change(run.grid, force), quiet.wrench)
+    # To first order in the clock, with a smoothed rate: resampling anew at each clock value would
+    # move the noise as well, and the cost with it, in a way that no derivative describes
+    force = node_values(run.grid, run.exciter.time, run.exciter.values)
+    rate = rate_of_change(run.grid, force)
+    return Input(run.grid.step, force + late * rate, rate, quiet.wrench)
 
 
 def start_basis(model: RigModel, state: State) -> Array:
@@ -63,8 +66,10 @@ def start_basis(model: RigModel, state: State) -> Array:
     return basis
 
 
-def read_device(bench: Bench, device: str, raw: Array, R: Array, own: Array) -> sensors.Reading:
-    """Reading of one device at the nodes. own: flat array of DeviceLayout."""
+def read_device(
+    bench: Bench, device: str, raw: Array, R: Array, own: Array, R_tracker_mean: Array | None = None
+) -> sensors.Reading:
+    """Reading of one device at the nodes. own: flat array of DeviceLayout; R_tracker_mean: see sensors.mocap."""
     rig, places = bench.rig, bench.parameters.places
     if device == "imu" and rig.imu is not None:
         turn = Rotation.from_quat(rig.imu.orientation).as_matrix()
@@ -73,8 +78,9 @@ def read_device(bench: Bench, device: str, raw: Array, R: Array, own: Array) -> 
         turn = Rotation.from_quat(rig.inclinometer.orientation).as_matrix()
         start = places.inclinometer
         return sensors.inclinometer(raw, turn, own[start : start + sensors.INCLINOMETER_SIZE])
-    if device == "mocap" and bench.mocap is not None:
-        return sensors.mocap(raw, R, bench.mocap, own[places.mocap : places.mocap + sensors.MOCAP_SIZE])
+    if device == "mocap" and bench.mocap is not None and R_tracker_mean is not None:
+        errors = own[places.mocap : places.mocap + sensors.MOCAP_SIZE]
+        return sensors.mocap(raw, R, bench.mocap, R_tracker_mean, errors)
     cable = places.cables.index(device)
     start = places.load_cells + sensors.LOAD_CELL_SIZE * cable
     return sensors.load_cell(raw, cable, own[start : start + sensors.LOAD_CELL_SIZE])
@@ -104,6 +110,7 @@ class Linearised:
     row_H: Array  # (m, 12) response of each row to the state at its node
     row_D: Array  # (m, 6) ... and to the wrench
     Q: Array  # (N, 6, 6) covariance of the wrench that noise stands for
+    latent: Array  # (N, 6) wrench noise that the nominal motion holds
     readings: dict[str, sensors.Reading]  # each device at the nodes
 
     @property
@@ -166,22 +173,33 @@ def _channel_rows(
 
 
 def linearise_run(
-    bench: Bench, run: Run, theta: Array, start: State, *, start_only: bool = False, extra_noise: Array | None = None
+    bench: Bench,
+    run: Run,
+    theta: Array,
+    start: State,
+    *,
+    start_only: bool = False,
+    extra_noise: Array | None = None,
+    latent: Array | None = None,
 ) -> Linearised | None:
     """Whitened residual and Jacobian of one run; None where the motion leaves every bound.
 
     Jacobian columns: the vector of ``bench.parameters``, then the start coordinates of
     :func:`start_basis`. ``start_only`` leaves the parameters' columns at zero and saves their cost.
     ``extra_noise`` (6, 6): covariance of a further random wrench held over each node interval.
+    latent (N, 6): wrench noise that the nominal motion is to hold (:func:`smoothed`); the motion
+    is then linearised about what really happened instead of about an undisturbed one.
     """
     parameters = bench.parameters
     model = model_at(parameters, theta)
     basis = start_basis(model, start)
     directions = np.zeros(0, dtype=np.int64) if start_only else parameters.directions()
+    driven = drive(run, parameters, theta)
+    held = np.zeros((run.grid.nodes, 6)) if latent is None else latent
     motion = simulate(
         model,
         start,
-        drive(run, parameters, theta),
+        replace(driven, wrench=driven.wrench + held),
         directions=directions,
         start_basis=basis,
         substeps=substeps_for(model, run.grid.step, FIT_STEP),
@@ -197,7 +215,7 @@ def linearise_run(
     for index, channel in enumerate(run.channels):
         if channel.device not in readings:
             readings[channel.device] = read_device(
-                bench, channel.device, motion.outputs, motion.R_world_body, own
+                bench, channel.device, motion.outputs, motion.R_world_body, own, run.R_tracker_mean
             )
         residual, jacobian, H, D = _channel_rows(bench, run, channel, motion, readings[channel.device], own)
         motion_width = starts + directions.size
@@ -228,7 +246,7 @@ def linearise_run(
     if extra_noise is not None:
         Q = Q + extra_noise
     if np.any(Q):
-        log_spread = float(whiten(motion.A, motion.B, Q, node, H, D, variance, columns))
+        log_spread = float(whiten(motion.A, motion.B, Q, held, node, H, D, variance, columns))
     else:
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
@@ -246,5 +264,27 @@ def linearise_run(
         H,
         D,
         Q,
+        held,
         readings,
+    )
+
+
+def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array, Array, Array]:
+    """Best correction of the nominal motion by the noise that enters as force, given the whole run.
+
+    start (12, 12): covariance of the start state (none: it is exact). Returns (N, 12) state
+    and (N, 6) wrench corrections and (N, 12, 12) covariance of the filtered state.
+    """
+    motion = linearised.motion
+    return smooth(  # type: ignore[no-any-return]
+        motion.A,
+        motion.B,
+        linearised.Q,
+        linearised.latent,
+        linearised.nodes,
+        linearised.row_H,
+        linearised.row_D,
+        linearised.variance,
+        linearised.plain,
+        np.zeros((12, 12)) if start is None else start,
     )

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import _noise
+from rig_identification.estimate.evidence import noise_std
 from rig_identification.estimate.prediction import Bench, device_start, read_device
 from rig_identification.model import layout
 from rig_identification.model.body import point_inertia, six_elements
 from rig_identification.model.equilibrium import Rest, find_rest
 from rig_identification.model.motion import RigModel, State
-from rig_identification.recording import Dummy, Recording
+from rig_identification.recording import Dummy, Recording, Series
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -59,19 +59,21 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
     """Means of everything that a static recording holds."""
     channels: list[RestChannel] = []
 
-    def add(device: str, quantity: str, unit: str, noise: str, values: Array, columns: slice) -> None:
-        std, _ = _noise(rig, noise, values)
+    def add(device: str, quantity: str, unit: str, noise: str, series: Series, columns: slice) -> None:
+        values = series.values
+        std, _ = noise_std(rig, noise, series.time, values)
         mean = np.mean(values, axis=0)
         channels.append(RestChannel(device, quantity, unit, columns, mean, mean_variance(values, std), std))
 
     for cable, series in recording.tension.items():
-        add(cable, "tension", "N", "tension", series.values, slice(0, 1))
+        add(cable, "tension", "N", "tension", series, slice(0, 1))
     if recording.imu is not None and rig.imu is not None:
-        values = recording.imu.values
-        add("imu", "angular_rate", "rad/s", "angular_rate", values[:, :3], slice(0, 3))
-        add("imu", "specific_force", "m/s^2", "specific_force", values[:, 3:], slice(3, 6))
+        time, values = recording.imu.time, recording.imu.values
+        rate, force = Series(time, values[:, :3]), Series(time, values[:, 3:])
+        add("imu", "angular_rate", "rad/s", "angular_rate", rate, slice(0, 3))
+        add("imu", "specific_force", "m/s^2", "specific_force", force, slice(3, 6))
     if recording.inclination is not None and rig.inclinometer is not None:
-        add("inclinometer", "inclination", "rad", "inclination", recording.inclination.values, slice(0, 2))
+        add("inclinometer", "inclination", "rad", "inclination", recording.inclination, slice(0, 2))
     return RestEvidence(recording, recording.dummy, tuple(channels))
 
 

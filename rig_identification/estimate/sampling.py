@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import savgol_coeffs, savgol_filter
 from scipy.sparse import csr_matrix
 
 Array = NDArray[np.float64]
@@ -102,13 +103,20 @@ def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
     return np.asarray(np.gradient(gaussian_filter1d(nodes, smoothing / grid.step, axis=0), grid.step, axis=0))
 
 
-def white_noise_std(values: Array) -> Array:
-    """(w,) standard deviation of the white part of samples (n, w), from their fourth differences.
+#: Stretch over which motion is a cubic to well below any sensor's noise, s.
+LOCAL = 0.06
 
-    Motion far below the sampling rate cancels in the fourth difference; white noise comes
-    out sqrt(70) times larger. The median keeps outliers out.
+
+def sample_noise_std(time: Array, values: Array) -> Array:
+    """(w,) standard deviation of what a local cubic does not follow in samples (n, w).
+
+    Not the white part alone: a tracker's jumps and bursts count, as they do in a fit.
     """
-    difference = np.diff(values, n=4, axis=0)
-    robust = 1.4826 * np.median(np.abs(difference), axis=0)
-    plain = np.std(difference, axis=0)
-    return np.asarray(np.where(robust > 0.0, robust, plain) / np.sqrt(70.0))
+    rate = (time.size - 1) / max(float(time[-1] - time[0]), 1e-9)
+    window = max(7, 2 * int(0.5 * LOCAL * rate) + 1)
+    if time.size < 2 * window:
+        return np.asarray(np.std(values, axis=0) + 1e-12)
+    rest = values - savgol_filter(values, window, 3, axis=0)
+    # A smoother with hat matrix H leaves (1 - H_ii) of white noise's variance, H being a projection there
+    kept = 1.0 - savgol_coeffs(window, 3)[window // 2]
+    return np.asarray(np.std(rest, axis=0) / np.sqrt(kept))

@@ -40,6 +40,7 @@ class Problem:
     weak: Array  # (10,) std of a weak prior on the log-Cholesky vector about ``weak_center``
     weak_center: Array  # (10,)
     bound: float = np.inf  # free parameters stay within so many of their prior std
+    extra_noise: Array | None = None  # (6, 6) random wrench over a node interval: what the model lacks
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Point:
     theta: Array
     starts: tuple[State, ...]  # one a run
     rest_guesses: tuple[State, ...]  # one a static recording
+    latents: tuple[Array | None, ...] = ()  # (N, 6) a run: see linearise_run; empty: none
 
 
 @dataclass(frozen=True)
@@ -89,10 +91,16 @@ def _prior(problem: Problem, theta: Array) -> tuple[float, Array, Array]:
 def evaluate(problem: Problem, point: Point) -> Evaluation | None:
     """Linearise everything at ``point``; None where a run or a rest pose cannot be computed."""
     bench = problem.bench
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        runs = list(
-            pool.map(lambda item: linearise_run(bench, item[0], point.theta, item[1]), zip(problem.runs, point.starts, strict=True))
+    latents = point.latents or (None,) * len(problem.runs)
+
+    def one(item: tuple[Run, State, Array | None]) -> Linearised | None:
+        run, start, latent = item
+        return linearise_run(
+            bench, run, point.theta, start, extra_noise=problem.extra_noise, latent=latent
         )
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        runs = list(pool.map(one, zip(problem.runs, point.starts, latents, strict=True)))
     if any(r is None for r in runs):
         return None
     rests = []
@@ -143,7 +151,7 @@ def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
         starts.append(on_cables(new, state.moved(basis @ own)))
         place += basis.shape[1]
     guesses = tuple(rest.rest.state for rest in evaluation.rests)
-    return Point(theta, tuple(starts), guesses)
+    return Point(theta, tuple(starts), guesses, evaluation.point.latents)
 
 
 def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Array:
@@ -151,7 +159,7 @@ def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Arra
 
     Active set: a parameter that the step would carry past its bound goes onto it, and the
     others are solved for again with that move made (Nocedal & Wright, "Numerical
-    Optimization", section 16.7). No log-Cholesky entry moves by more than LONGEST_STEP.
+    Optimization", section 16.7). The body moves by no more than LONGEST_STEP.
     """
     p = problem.bench.parameters.size
     information = current.information + damping * np.diag(np.diag(current.information))
@@ -171,12 +179,12 @@ def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Arra
         beyond = np.flatnonzero(reached)
         change[beyond] = np.sign(theta[beyond] + change[beyond]) * problem.bound - theta[beyond]
         fixed |= reached
-    longest = float(np.max(np.abs(change[:INERTIAL])))
+    longest = float(np.max(np.abs(change[:INERTIAL]) / problem.weak))
     return change * min(1.0, LONGEST_STEP / max(longest, 1e-300))
 
 
-#: No entry of the log-Cholesky vector moves further than this in one step (logarithms, m).
-LONGEST_STEP = 1.0
+#: No entry of the log-Cholesky vector moves further in one step, in units of its weak prior's std.
+LONGEST_STEP = 0.5
 
 
 def solve(

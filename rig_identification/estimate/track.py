@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.prediction import Bench, linearise_run, model_at
-from rig_identification.estimate.whitening import smooth
+from rig_identification.estimate.prediction import Bench, linearise_run, model_at, smoothed
 from rig_identification.model import layout
 from rig_identification.model.motion import State, on_cables
 
@@ -75,17 +74,7 @@ def track(bench: Bench, run: Run, theta: Array, start: State, start_spread: Arra
         lin = linearise_run(bench, part, theta, state, start_only=True, extra_noise=noise)
         if lin is None:
             return None
-        corrections, wrench, filtered = smooth(
-            lin.motion.A,
-            lin.motion.B,
-            lin.Q,
-            lin.nodes,
-            lin.row_H,
-            lin.row_D,
-            lin.variance,
-            lin.plain,
-            P,
-        )
+        corrections, wrench, filtered = smoothed(lin, P)
         if not np.all(np.isfinite(corrections)):
             return None
         for k in range(last - first + 1):

@@ -15,12 +15,13 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def whiten(A, B, Q, node, H, D, variance, columns):  # type: ignore[no-untyped-def]
+def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-untyped-def]
     """Replace ``columns`` (m, c) by their normalised innovations; returns the sum of log standard deviations.
 
     node (m,): ascending node index of each row. H (m, 12), D (m, 6): response of the row to
     state and wrench. variance (m,): sensor noise of the row. Q (N, 6, 6): covariance of the
-    wrench over each interval. Column 0 is measured less predicted, the others derivatives
+    wrench over each interval. latent (N, 6): wrench that the nominal motion already holds of
+    this noise, whose mean is zero all the same. Column 0 is measured less predicted, the others derivatives
     of the prediction.
     """
     rows, count = columns.shape
@@ -43,6 +44,7 @@ def whiten(A, B, Q, node, H, D, variance, columns):  # type: ignore[no-untyped-d
                 P[j, 12 + i] = 0.0
             for c in range(count):
                 X[12 + i, c] = 0.0
+            X[12 + i, 0] = -latent[k, i]
         while row < rows and node[row] == k:
             for i in range(12):
                 h[i] = H[row, i]
@@ -90,7 +92,7 @@ def whiten(A, B, Q, node, H, D, variance, columns):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True)
-def smooth(A, B, Q, node, H, D, variance, residual, start):  # type: ignore[no-untyped-def]
+def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ignore[no-untyped-def]
     """Best correction of the nominal motion by noise that enters as force, given the whole run.
 
     Arguments as in :func:`whiten`; residual (m,) measured less predicted; start (12, 12)
@@ -115,7 +117,7 @@ def smooth(A, B, Q, node, H, D, variance, residual, start):  # type: ignore[no-u
     row = 0
     for k in range(nodes):
         for i in range(6):
-            x[12 + i] = 0.0
+            x[12 + i] = -latent[k, i]
             for j in range(6):
                 P[12 + i, 12 + j] = Q[k, i, j]
             for j in range(12):

@@ -49,6 +49,12 @@ from rig_identification.model.layout import (
 )
 
 
+#: Softness of a rigid cable at acceleration level, m/s^2 per N. It moves nothing that can be measured
+#: (3e-7 m/s^2 under 3 kN, and lengths are restored at each step); where more cables than needed hold
+#: the body still, it makes their shares of the load the smallest ones instead of undefined.
+COMPLIANCE = 1e-10
+
+
 @njit(cache=True)
 def rotation(reference, x, out):  # type: ignore[no-untyped-def]
     """out (3, 3) = reference Exp(phi), phi = x[ROTATION:]; a series, exact to 1e-15 for |phi| < 0.05."""
@@ -192,6 +198,7 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
             K[row, 3] = -mx
             K[row, 4] = -my
             K[row, 5] = -mz
+            K[row, row] = -COMPLIANCE
             r[row] = (
                 ux * (wy * ez - wz * ey)
                 + uy * (wz * ex - wx * ez)

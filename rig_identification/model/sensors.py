@@ -129,13 +129,15 @@ class MocapMount:
     R_body_marker: Array  # (3, 3)
     world_position: Array  # (3,) m, origin of world in the tracker frame
     R_tracker_world: Array  # (3, 3)
-    R_tracker_mean: Array  # (3, 3) orientation about which rotation vectors are taken
 
 
-def mocap(raw: Array, R_world_body: Array, mount: MocapMount, device: Array) -> Reading:
+def mocap(
+    raw: Array, R_world_body: Array, mount: MocapMount, R_tracker_mean: Array, device: Array
+) -> Reading:
     """Pose (N, 6) of the marker frame in the tracker frame: position m, rotation vector about the mean rad.
 
-    device (12,): errors of the mount: marker position m (body), marker rotation (rad, body
+    R_tracker_mean (3, 3): orientation about which rotation vectors are taken, so that they
+    stay short. device (12,): errors of the mount: marker position m (body), marker rotation (rad, body
     axes, left), world position m (tracker), world rotation (rad, tracker axes, left).
     """
     r = mount.marker_position + device[0:3]
@@ -145,7 +147,7 @@ def mocap(raw: Array, R_world_body: Array, mount: MocapMount, device: Array) -> 
     marker_world = raw[:, POSITION] + R_world_body @ r
     position = marker_world @ R_tw.T + shift
     R_tb = R_tw @ R_world_body
-    about_mean = mount.R_tracker_mean.T @ R_tb @ R_bm
+    about_mean = R_tracker_mean.T @ R_tb @ R_bm
     turn = Rotation.from_matrix(about_mean).as_rotvec()
     J_inverse = inverse_right_jacobian(turn)
     nodes, width = raw.shape

@@ -1,0 +1,83 @@
+"""Body and intervals where the ideal model does not explain the recordings.
+
+An output-error fit of a model that lacks something bends every parameter to swallow it and
+states an interval that is far too small. Two measures limit the harm until the missing
+physics is found: runs are fitted in short pieces (segments.py), and every channel is
+weighed by what the residual really has at the frequencies of the motion, instead of by its
+sensor's noise. A channel that contradicts the model then counts for as little as it deserves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.rest_evidence import RestEvidence
+from rig_identification.estimate.segments import solve_in_pieces
+from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.model.motion import State
+
+Array = NDArray[np.float64]
+
+#: Frequencies at which rigid rigs move, Hz.
+MOTION_BAND = 5.0
+#: Rounds of weighing and fitting.
+ROUNDS = 2
+
+
+def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[tuple[str, str, int], float]:
+    """Factor on the noise of each (device, quantity, axis): root of the residual's power in the motion's band."""
+    power: dict[tuple[str, str, int], list[Array]] = {}
+    for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
+        for index, channel in enumerate(run.channels):
+            for axis in range(channel.width):
+                rows = linearised.residual[(linearised.channel == index) & (linearised.axis == axis)]
+                if rows.size < 8:
+                    continue
+                rate = (rows.size - 1) / max(float(np.ptp(channel.time)), 1e-9)
+                ordinates = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
+                inside = np.arange(ordinates.size) * rate / rows.size <= MOTION_BAND
+                power.setdefault((channel.device, channel.quantity, axis), []).append(ordinates[inside])
+    return {key: float(np.sqrt(max(1.0, np.mean(np.concatenate(v))))) for key, v in power.items()}
+
+
+def reweighted(problem: Problem, evaluation: Evaluation) -> Problem:
+    """The problem with every channel's noise, and every rest mean's, as large as its residuals say."""
+    factors = band_inflation(problem, evaluation)
+    runs = []
+    for run in problem.runs:
+        channels = []
+        for c in run.channels:
+            scale = np.array([factors.get((c.device, c.quantity, a), 1.0) for a in range(c.width)])
+            channels.append(replace(c, noise=c.noise * scale))
+        runs.append(replace(run, channels=tuple(channels)))
+    rests = []
+    for evidence, rest in zip(problem.rests, evaluation.rests, strict=True):
+        rests.append(_reweighted_rest(evidence, rest.predicted))
+    return replace(problem, runs=tuple(runs), rests=tuple(rests))
+
+
+def _reweighted_rest(evidence: RestEvidence, predicted: tuple[Array, ...]) -> RestEvidence:
+    channels = []
+    for c, p in zip(evidence.channels, predicted, strict=True):
+        channels.append(replace(c, variance=np.maximum(c.variance, (c.mean - p) ** 2)))
+    return replace(evidence, channels=tuple(channels))
+
+
+def solve_cautiously(
+    problem: Problem,
+    theta: Array,
+    rest: State,
+    rest_guesses: tuple[State, ...],
+    notify: Callable[[int, float], None] | None = None,
+) -> tuple[Problem, Evaluation, bool]:
+    """Fit in pieces, weighed by the residuals themselves: (problem, evaluation, whether it converged)."""
+    parts, evaluation, converged = solve_in_pieces(problem, theta, rest, rest_guesses, notify)
+    for _ in range(ROUNDS):
+        parts = reweighted(parts, evaluation)
+        point = Point(evaluation.point.theta, evaluation.point.starts, evaluation.point.rest_guesses)
+        evaluation, converged = solve(parts, point, iterations=10, notify=notify)
+    return parts, evaluation, converged

@@ -1,0 +1,84 @@
+"""A first guess where no tension is measured: the body's size and depth are scanned, then fitted briefly.
+
+Without forces momentum cannot be balanced, and a wrong inertia puts the motion out of step
+within a period, where a fit finds no way back. A coarse scan of two numbers (inertia as a
+whole, depth of the centre of mass) over one short piece, each with its own best start
+state, lands inside the basin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.first_guess import extent, headings, mocap_mount, rest_of, start_from_mocap
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.prediction import Bench, model_at
+from rig_identification.estimate.solve import Point, Problem, fit_start, solve
+from rig_identification.model.motion import State
+from rig_identification.model.sensors import MOCAP_SIZE
+
+Array = NDArray[np.float64]
+
+#: Inertia as a multiple of the first guess, and depth as a share of the rig's extent.
+SIZES = tuple(float(s) for s in np.geomspace(0.3, 4.0, 9))
+DEPTHS = (0.05, 0.15, 0.4)
+#: Piece that the scan looks at, s, taken from the middle of the second half of a run.
+SCANNED = 4.0
+#: Share of the weak prior's std within which the brief fit may move from the scan's best.
+NEAR = 0.2
+
+
+@dataclass(frozen=True)
+class Scanned:
+    """The best of the scan, briefly fitted."""
+
+    problem: Problem
+    theta: Array
+    rest: State
+
+
+def _candidates(problem: Problem, piece: Run, whole: Run):  # type: ignore[no-untyped-def]
+    """Yield (bench, theta, rest, start) over headings, depths and sizes."""
+    parameters, rig = problem.bench.parameters, problem.bench.rig
+    first = parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))
+    size = float(np.max(extent(rig)))
+    seen = whole.R_tracker_mean is not None
+    for heading in headings(rig, whole) if seen else [0.0]:
+        for depth in DEPTHS:
+            elements = first.copy()
+            elements[3] = np.mean([c.body_point[2] for c in rig.cables]) - depth * size
+            rest = rest_of(model_at(parameters, parameters.start(elements)))
+            bench: Bench = problem.bench
+            if seen:
+                bench = replace(bench, mocap=mocap_mount(rig, whole, rest, heading))
+            for scale in SIZES:
+                elements[4:] = scale * first[4:]
+                theta = parameters.start(elements)
+                start = None
+                if bench.mocap is not None:
+                    model = model_at(parameters, theta)
+                    start = start_from_mocap(model, piece, bench.mocap, np.zeros(MOCAP_SIZE))
+                yield bench, theta, rest, rest if start is None else start
+
+
+def scan(problem: Problem, run: Run) -> Scanned | None:
+    """Scan a run of ``problem``; None where no candidate can be followed."""
+    nodes = run.grid.nodes
+    half = run.between(nodes // 2, nodes - 1)
+    piece = half.until(SCANNED)
+    best, kept = np.inf, None
+    for bench, theta, rest, start in _candidates(problem, piece, half):
+        found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
+        if found is not None and found[0].cost < best:
+            best, kept = found[0].cost, (bench, theta, rest, found[1])
+    if kept is None:
+        return None
+    bench, theta, rest, start = kept
+    settled = replace(problem, bench=bench, runs=(run,), weak_center=theta[:INERTIAL].copy())
+    brief = replace(settled, runs=(piece,), rests=(), weak=NEAR * problem.weak)
+    evaluation, _ = solve(brief, Point(theta, (start,), ()), iterations=25, tolerance=0.5)
+    return Scanned(settled, evaluation.point.theta, rest)

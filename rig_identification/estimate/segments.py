@@ -1,0 +1,93 @@
+"""A run in short pieces, each with a start state of its own.
+
+What a model leaves out adds up over time: friction that costs a percent of amplitude in one
+period costs half of it in a minute. Within a period or two it is nearly gone, and a free
+start state every few seconds takes it up. Such a fit gives away precision and is bent less.
+It also tells in which pieces a run is free motion at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, solve
+from rig_identification.model.motion import State
+
+Array = NDArray[np.float64]
+
+#: Length of a piece, s: one to two periods of the slowest rigid mode of such rigs (0.37 Hz and up).
+PIECE = 4.0
+
+
+def pieces(run: Run, length: float = PIECE) -> tuple[Run, ...]:
+    """A run cut into equal pieces of about ``length`` seconds."""
+    nodes = run.grid.nodes
+    count = max(1, round(run.grid.duration / length))
+    edges = np.linspace(0, nodes - 1, count + 1).astype(int)
+    return tuple(run.between(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True))
+
+
+def solve_in_pieces(
+    problem: Problem,
+    theta: Array,
+    rest: State,
+    rest_guesses: tuple[State, ...],
+    notify: Callable[[int, float], None] | None = None,
+) -> tuple[Problem, Evaluation, bool]:
+    """The same problem with every run in pieces: (that problem, its evaluation, whether it converged)."""
+    cut = tuple(piece for run in problem.runs for piece in pieces(run))
+    starts = tuple(launch_state(problem.bench, piece, theta, rest) for piece in cut)
+    parts = replace(problem, runs=cut)
+    evaluation, converged = solve(parts, Point(theta, starts, rest_guesses), iterations=15, notify=notify)
+    return parts, evaluation, converged
+
+
+@dataclass(frozen=True)
+class FreePart:
+    """The longest stretch of a run in which nothing but the rig acts on the body."""
+
+    run: Run  # cut to that stretch
+    start: float  # s after the recording's start
+    end: float  # s
+    held: tuple[tuple[float, float], ...]  # stretches (s) in which something else acts
+
+
+#: A piece counts as driven where it fits so many times worse than the calm half of the run.
+DRIVEN = 3.0
+#: Length of the pieces that are told apart, s.
+SHORT_PIECE = 2.0
+
+
+def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart:
+    """Find the free stretch: each short piece is fitted by its start state alone, and the bad ones are driven.
+
+    The yardstick is the better half of the pieces that move; a piece at rest fits always and says nothing.
+    """
+    cut = pieces(run, SHORT_PIECE)
+    errors = np.full(len(cut), np.inf)
+    for i, piece in enumerate(cut):
+        fitted = fit_start(problem.bench, piece, theta, launch_state(problem.bench, piece, theta, rest))
+        if fitted is not None:
+            errors[i] = float(np.sqrt(np.mean(fitted[0].residual ** 2)))
+    calm = float(np.median(np.sort(errors)[: max(1, (len(cut) + 1) // 2)]))
+    driven = errors > DRIVEN * calm
+    best, begin = (0, 0), 0
+    for i in range(len(cut) + 1):
+        if i == len(cut) or driven[i]:
+            if i - begin > best[1] - best[0]:
+                best = (begin, i)
+            begin = i + 1
+    first, last = cut[best[0]], cut[best[1] - 1]
+    step = run.grid.step
+    a = round((first.offset - run.offset) / step)
+    b = round((last.offset - run.offset) / step) + last.grid.nodes - 1
+    held = tuple(
+        (piece.offset, piece.offset + piece.grid.duration) for piece, bad in zip(cut, driven, strict=True) if bad
+    )
+    return FreePart(run.between(a, b), first.offset, last.offset + last.grid.duration, held)
