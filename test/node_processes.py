@@ -22,11 +22,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+import rig_identification
+
 with warnings.catch_warnings():  # the wheels' lark imports a deprecated module
     warnings.simplefilter("ignore", DeprecationWarning)
     import rosidl_generator_py  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = Path(rig_identification.__file__).parents[1]  # where nodes find what the tests import
 _DOMAINS = itertools.count(random.SystemRandom().randrange(1, 60))
 
 RIG = """\
@@ -73,7 +76,7 @@ class Graph:
             command += ["-p", parameter]
         environment = {
             **os.environ, "ROS_DOMAIN_ID": str(self.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+            "PYTHONPATH": os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")]),
             "OMP_NUM_THREADS": "1", "ROS_LOG_DIR": str(self.folder / "log"),
         }  # fmt: skip
         process = subprocess.Popen(

@@ -31,3 +31,34 @@ def test_every_service_is_documented() -> None:
     for file in (ROOT / "rig_identification" / "nodes").glob("*.py"):
         for service in re.findall(r'serve\("~/(\w+)"', file.read_text(encoding="utf-8")):
             assert f"{file.stem}/{service}`" in text, f"{file.stem}/{service} is not in docs/graph.md"
+
+
+@pytest.mark.parametrize("name", ["simulated_rig", "rig", "replay"])
+def test_launch_files_describe_nodes_that_exist(name: str) -> None:
+    """Only where a full ROS 2 brings launch, which the package index has not."""
+    pytest.importorskip("launch_ros", reason="launch_ros is not installed: it comes with a full ROS 2 alone")
+    import importlib.util
+
+    from launch_ros.actions import Node
+
+    specification = importlib.util.spec_from_file_location(name, ROOT / "launch" / f"{name}.launch.py")
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    nodes = [entity for entity in module.generate_launch_description().entities if isinstance(entity, Node)]
+    assert len(nodes) >= 4
+
+
+def test_launch_files_name_executables_of_the_package() -> None:
+    process = importlib.import_module("rig_identification.nodes.process")
+    named = set()
+    for file in (ROOT / "launch").glob("*.launch.py"):
+        named |= set(
+            re.findall(
+                r'"([a-z_]+)",?(?=[\s,)])',
+                re.search(r"(?:NODES|LISTENERS) = \(.*?\)", file.read_text(), re.S)[0],
+            )
+        )
+    assert {"tracker", "identifier", "rig_simulator"} <= named
+    assert all(callable(getattr(process, name, None)) for name in named)

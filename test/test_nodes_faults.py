@@ -169,6 +169,19 @@ def test_a_node_started_twice_and_one_started_late_are_named(graph: Graph, probe
     assert graph.end(late) == (0, "")
 
 
+def test_a_clock_that_was_never_set_is_said(graph: Graph, probe: Probe) -> None:
+    graph.start("rig_simulator", *SIMULATOR)
+    graph.start("load_cells", "simulation.rate:=100.0")
+    graph.start("imu", "simulation.rate:=100.0", "simulation.clock_offset:=5.0")
+    recorder = graph.start("recorder")
+    diagnostics = Diagnostics(probe)
+    line = "recorder: /rig/imu/data_raw"
+    probe.spin_until(lambda: diagnostics.says(line, "s off the other devices'"), 40.0, "the word")
+    assert float(diagnostics.value(line, "clock_difference")) == pytest.approx(5.0, abs=0.1)
+    assert diagnostics.lines["recorder: /rig/cable_1/wrench"].level == DiagnosticStatus.OK
+    assert graph.end(recorder) == (0, "")
+
+
 def test_a_silent_cable_and_a_still_window_are_said(graph: Graph, probe: Probe) -> None:
     graph.start("rig_simulator", *SIMULATOR)
     graph.start("load_cells", "simulation.rate:=100.0", remaps=["cable_3/wrench:=elsewhere"])

@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from node_processes import BODY, SIMULATOR, Graph, Probe
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from visualization_msgs.msg import MarkerArray
 
 from rig_identification.estimate import identify
@@ -126,6 +126,7 @@ def test_a_session_replayed_gives_the_same_inertia_as_read_from_disk(recorded: P
         empty = probe.call("identifier/identify_inertia")
         assert not empty.success
         assert "no window is complete" in empty.message
+        progress = probe.listen(String, "identifier/progress")
         told = probe.listen(Float64MultiArray, "identifier/covariance")
         graph.start("replay", f"session:={recorded}", "rate:=2.0", "operate:=identifier", "pause:=0.5")
         states: list[str] = []
@@ -143,6 +144,7 @@ def test_a_session_replayed_gives_the_same_inertia_as_read_from_disk(recorded: P
         probe.spin_until(future.done, 120.0, "the fit")
         answer = future.result()
         assert answer.success, answer.message
+        assert len({json.loads(message.data)["stage"] for message in progress}) > 3
         result = json.loads(answer.message)
         assert result["recordings"] == ["static_1", "static_2", "run_1"]
         live = np.array(result["inertia"]["value"])[np.triu_indices(3)]

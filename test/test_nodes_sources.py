@@ -19,7 +19,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 pytest.importorskip("serial", reason="pyserial is not installed: pip install '.[ros]'")
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from node_processes import ROOT, Graph, Probe
+from node_processes import PACKAGE, Graph, Probe
 from sensor_msgs.msg import Imu
 
 from rig_identification.session import read_session
@@ -149,7 +149,7 @@ def test_one_command_brings_the_simulated_rig_up_and_down(graph: Graph, probe: P
     ]  # fmt: skip
     environment = {
         **os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "PYTHONPATH": str(ROOT),
+        "PYTHONPATH": str(PACKAGE),
     }  # fmt: skip
     process = subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True

@@ -77,7 +77,7 @@ class Plant:
             The motion leaves every bound; the body is put to rest.
         """
         count = max(1, round(duration / self._step))
-        time = self._step * (self.nodes - self._shaken_since + np.arange(count + 1))
+        time = self._step * (self.nodes - self._shaken_since + np.arange(count + 1.0))
         force = np.zeros((count + 1, 3)) if self._shaking is None else self._shaking.force(time)
         rates = np.gradient(force, self._step, axis=0)
         motion = simulate(self._model, self.state, Input(self._step, force, rates, np.zeros((count + 1, 6))))

@@ -59,4 +59,4 @@ def serve_later(
         else:
             send_now(answer, header)
 
-    service.send_response = send_response  # type: ignore[method-assign,assignment]
+    service.send_response = send_response  # type: ignore[method-assign, assignment]

@@ -75,7 +75,7 @@ class IdentifierNode(RigNode):
         names = tuple(cable.name for cable in self._description.cables)
         topics = expected_topics(names, self.get_namespace())
         self.windows = SessionFolder(folder, self._description, topics, self.own.text("storage"))
-        self.intake = Intake(self, topics, self.own.whole("depth"))
+        self.intake = Intake(self, topics, self.own.whole("depth"), watch_range=True)
         self.running = RunningEstimator(self, self._description, self.own.number("running_rate"))
         self.request: Request | None = None
         self.latest: dict[str, Any] | None = None  # answer of the latest fit that went well

@@ -19,10 +19,15 @@ from rig_identification.errors import InputError
 from rig_identification.live.stamp_gate import StampGate
 from rig_identification.nodes.rig_node import reliable
 from rig_identification.nodes.wire import TYPES, channel_values, decode_batch
+from rig_identification.session.clipping import clipped_samples
 from rig_identification.session.topics import Topic
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
+
+
+#: Channels whose sensor has an end of range.
+CAN_CLIP = ("tension", "exciter_force", "imu", "inclination")
 
 
 @dataclass(frozen=True)
@@ -49,15 +54,21 @@ class Intake:
         Name of the topic to what it carries.
     depth : int
         Messages that the middleware keeps for each topic: a second's worth.
+    watch_range : bool
+        Keep samples for :meth:`look_for_clipping`, which must then be called each second.
     """
 
-    def __init__(self, node: Node, topics: dict[str, Topic], depth: int) -> None:
+    def __init__(self, node: Node, topics: dict[str, Topic], depth: int, watch_range: bool = False) -> None:
         self.topics = topics
         self.gates = {name: StampGate() for name in topics}
         self.not_finite = dict.fromkeys(topics, 0)
         self.garbled = dict.fromkeys(topics, 0)
+        self.clipped = dict.fromkeys(
+            topics, 0
+        )  # samples stuck at the end of the range, looked at a second each
+        self._recent: dict[str, list[Array]] = {name: [] for name in topics}
         self.last_arrival = dict.fromkeys(topics, 0.0)  # s, steady clock
-        self._node = node
+        self._node, self._watch_range = node, watch_range
         self._waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in topics}
         # With simulated time, arrivals are taken on that clock: stamps of a fast replay outrun the wall's
         self._simulated = bool(node.get_parameter("use_sim_time").value)
@@ -67,14 +78,15 @@ class Intake:
             )
 
     def _gather(self, name: str) -> Callable[[bytes], None]:
-        waiting, now = self._waiting, self._now_ns
+        waiting, now = self._waiting, self.now_ns
 
         def gather(message: bytes) -> None:
             waiting[name].append((now(), message))
 
         return gather
 
-    def _now_ns(self) -> int:
+    def now_ns(self) -> int:
+        """The clock on which arrivals are taken."""
         if not self._simulated:
             return time.time_ns()
         clock = self._node.get_clock()
@@ -106,7 +118,16 @@ class Intake:
         finite = np.isfinite(values).all(axis=1)
         self.not_finite[name] += int(np.count_nonzero(admitted & ~finite))
         used = admitted & finite
+        if self._watch_range and topic.channel in CAN_CLIP:
+            self._recent[name].append(values[used])
         return Batch(topic, messages, arrival, stamps[used], values[used])
+
+    def look_for_clipping(self) -> None:
+        """Count the clipped samples since the last call; called each second."""
+        for name, pieces in self._recent.items():
+            if pieces:
+                self.clipped[name] += int(np.count_nonzero(clipped_samples(np.concatenate(pieces))))
+                pieces.clear()
 
     def silence(self, name: str) -> float:
         """Seconds since the last message of a topic; infinite before the first."""

@@ -36,7 +36,7 @@ class RecorderNode(RigNode):
             raise InputError(f"parameter folder: {folder} holds a session already; name a new one")
         topics = expected_topics(tuple(cable.name for cable in rig.cables), self.get_namespace())
         self.session = SessionFolder(folder, rig, topics, self.own.text("storage"))
-        self.intake = Intake(self, topics, self.own.whole("depth"))
+        self.intake = Intake(self, topics, self.own.whole("depth"), watch_range=True)
         self._trouble = ""
         self.serve("~/start", self._start)
         self.serve("~/stop", self._stop)

@@ -16,7 +16,8 @@ CLOCKS_APART = 0.1
 
 
 def stream_status(node: Node, intake: Intake) -> list[DiagnosticStatus]:
-    """One line a topic."""
+    """One line a topic; called each second."""
+    intake.look_for_clipping()
     offsets = [gate.offset for gate in intake.gates.values() if np.isfinite(gate.offset)]
     reference = float(np.median(offsets)) if offsets else 0.0
     return [_topic_status(node, intake, name, reference) for name in intake.topics]
@@ -27,10 +28,12 @@ def _topic_status(node: Node, intake: Intake, name: str, reference: float) -> Di
     if gate.received == 0:
         return diagnostic(f"{node.get_name()}: {name}", OK, "not there")
     level, message = OK, f"{gate.rate:.4g} Hz"
-    late = gate.offset - reference
+    late = reference - gate.offset  # positive: its stamps are late
     publishers = node.count_publishers(name)
     if gate.rejected or intake.not_finite[name] or intake.garbled[name]:
         level, message = WARN, f"{gate.rejected} stamps refused, {intake.not_finite[name]} samples not finite"
+    if intake.clipped[name]:
+        level, message = WARN, f"{intake.clipped[name]} samples clipped: the sensor's range is too small"
     if abs(late) > CLOCKS_APART:
         level, message = WARN, f"clock is {late:+.3f} s off the other devices'"
     if publishers > 1:
@@ -42,5 +45,6 @@ def _topic_status(node: Node, intake: Intake, name: str, reference: float) -> Di
         received=gate.received, admitted=gate.admitted, rate=f"{gate.rate:.6g}",
         gaps=gate.gaps, missing=gate.missing, duplicated=gate.duplicated, backward=gate.backward,
         ahead=gate.ahead, zero=gate.zero, restarts=gate.restarts, not_finite=intake.not_finite[name],
+        clipped=intake.clipped[name],
         garbled=intake.garbled[name], publishers=publishers, clock_difference=f"{late:.6f}",
     )  # fmt: skip

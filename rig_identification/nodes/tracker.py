@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from time import time_ns
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -74,7 +73,7 @@ class TrackerNode(RigNode):
         for message in self._writer.serialize(tracked):
             self._odometry.publish(message)
         self._latest = tracked
-        self.latency.extend(((time_ns() - imu.arrival_ns) / 1e9).tolist())
+        self.latency.extend(((self.intake.now_ns() - imu.arrival_ns) / 1e9).tolist())
 
     def _draw(self) -> None:
         if self._latest is None:
