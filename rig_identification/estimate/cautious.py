@@ -29,7 +29,7 @@ ROUNDS = 2
 
 
 def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[tuple[str, str, int], float]:
-    """Factor on the noise of each (device, quantity, axis): root of the residual's power in the motion's band."""
+    """Factor on the noise of each (device, quantity, axis): root of the residual's power where motion is."""
     power: dict[tuple[str, str, int], list[Array]] = {}
     for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
         for index, channel in enumerate(run.channels):
@@ -41,7 +41,7 @@ def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[tuple[str, 
                 ordinates = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
                 inside = np.arange(ordinates.size) * rate / rows.size <= MOTION_BAND
                 power.setdefault((channel.device, channel.quantity, axis), []).append(ordinates[inside])
-    return {key: float(np.sqrt(max(1.0, np.mean(np.concatenate(v))))) for key, v in power.items()}
+    return {key: float(np.sqrt(max(1.0, float(np.mean(np.concatenate(v)))))) for key, v in power.items()}
 
 
 def reweighted(problem: Problem, evaluation: Evaluation) -> Problem:

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def node_corrections(linearised: Linearised) -> Array | None:
-    """(N, 18 + n) correction of the raw outputs by the smoothed error of the exciter's force; None without noise."""
+    """(N, 18 + n) correction of the raw outputs by the exciter's smoothed force error; None: no noise."""
     motion = linearised.motion
     if not np.any(linearised.Q) or motion.H is None or motion.D is None:
         return None

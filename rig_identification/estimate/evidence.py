@@ -70,7 +70,7 @@ class Run:
 
     def until(self, end: float) -> Run:
         """The same run, cut off at ``end`` seconds."""
-        return self.between(0, int(round(end / self.grid.step)), margin=MARGIN)
+        return self.between(0, round(end / self.grid.step), margin=MARGIN)
 
     def between(self, first: int, last: int, margin: float = 0.0) -> Run:
         """Nodes ``first`` to ``last`` as a run of their own; its time starts at node ``first``."""
@@ -90,11 +90,11 @@ class Run:
         exciter = self.exciter
         if exciter is not None:
             # Two extra intervals on either side, so that the input's spline feels no edge
-            near = (exciter.time >= shift - 2 * grid.step) & (exciter.time <= shift + grid.duration + 2 * grid.step)
+            near = (exciter.time >= shift - 2 * grid.step) & (
+                exciter.time <= shift + grid.duration + 2 * grid.step
+            )
             exciter = Series(exciter.time[near] - shift, exciter.values[near]) if np.any(near) else None
-        return replace(
-            self, grid=grid, channels=tuple(cut), exciter=exciter, offset=self.offset + shift
-        )
+        return replace(self, grid=grid, channels=tuple(cut), exciter=exciter, offset=self.offset + shift)
 
 
 def noise_std(rig: Rig, name: str, time: Array, values: Array) -> tuple[Array, bool]:
@@ -161,4 +161,3 @@ def prepare(rig: Rig, recording: Recording) -> Run:
     else:
         exciter = None
     return Run(recording, grid, tuple(c for c in found if c is not None), exciter, noise, rate, mean)
-

@@ -121,7 +121,7 @@ def mocap_mount(rig: Rig, run: Run, rest: State, heading: float) -> sensors.Moca
 def start_from_mocap(
     model: RigModel, run: Run, mount: sensors.MocapMount, device: Array, span: float = 0.2
 ) -> State | None:
-    """Pose and velocity at time 0 from straight lines through the first ``span`` seconds; None without motion capture.
+    """Pose and velocity at time 0 from lines through the first ``span`` seconds; None without motion capture.
 
     device (12,): current errors of the mount (model/sensors.py).
     """

@@ -10,11 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, Linearised
 from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, shortened, solve
 from rig_identification.model.motion import State
+
+Array = NDArray[np.float64]
 
 #: First horizon (s) and growth: about a period of such a rig, then fourfold.
 FIRST_HORIZON = 2.0
@@ -30,6 +35,16 @@ def horizons(duration: float) -> list[float]:
         ends.append(end)
         end *= GROWTH
     return [*ends, duration]
+
+
+def _at(notify: Callable[[float, str], None], end: float, duration: float) -> Callable[[int, float], None]:
+    """Progress of one horizon as progress of them all."""
+
+    def step_done(step: int, cost: float) -> None:
+        _ = cost
+        notify(end / max(duration, 1e-9), f"first {end:.1f} s, step {step + 1}")
+
+    return step_done
 
 
 def solve_growing(
@@ -51,18 +66,20 @@ def solve_growing(
             point,
             iterations=15 if whole else 8,
             tolerance=1e-3 if whole else 0.5,
-            notify=None if notify is None else lambda k, cost, e=end: notify(e / max(duration, 1e-9), f"first {e:.1f} s, step {k + 1}"),
+            notify=None if notify is None else _at(notify, end, duration),
         )
         point = evaluation.point
     return evaluation, converged
 
 
-def fit_start_growing(bench: Bench, run: Run, theta, start: State) -> tuple[Linearised, State] | None:  # type: ignore[no-untyped-def]
+def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tuple[Linearised, State] | None:
     """A held-out run's start state over growing horizons."""
     result = None
     for end in horizons(run.grid.duration):
         whole = end >= run.grid.duration
-        result = fit_start(bench, run if whole else run.until(end), theta, start, tolerance=1e-3 if whole else 0.5)
+        result = fit_start(
+            bench, run if whole else run.until(end), theta, start, tolerance=1e-3 if whole else 0.5
+        )
         if result is None:
             return None
         start = result[1]

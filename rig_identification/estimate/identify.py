@@ -72,7 +72,11 @@ def pose_problem(session: Session) -> tuple[Problem, Array, tuple[Run, ...]]:
         )
     parameters = parameter_set(rig, model, channels)
     theta = parameters.start(elements)
-    mass = None if rig.mass is None else (rig.mass, rig.mass_std if rig.mass_std is not None else 1e-3 * rig.mass)
+    mass = (
+        None
+        if rig.mass is None
+        else (rig.mass, rig.mass_std if rig.mass_std is not None else 1e-3 * rig.mass)
+    )
     problem = Problem(
         Bench(rig, parameters), runs, rests, mass, weak_prior(rig), theta[:INERTIAL].copy(), bound=ORDINARY
     )

@@ -52,7 +52,7 @@ class Launch:
         return replace(self, theta=theta, rest=rest, starts=(rest,) * len(problem.runs))
 
     def from_momentum(self) -> Launch:
-        """Start states from the tracked motion, and inertia from its momentum where every cable is measured."""
+        """Start states from the tracked motion; inertia from its momentum where all tensions are measured."""
         if self.rest is None:
             raise ValueError("from_rest comes first")
         problem, parameters = self.problem, self.problem.bench.parameters

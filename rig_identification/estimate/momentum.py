@@ -65,7 +65,7 @@ def weight_map(track: Track, gravity: Array) -> Array:
 
 
 def applied_wrench(track: Track, run: Run, parameters: ParameterSet, theta: Array) -> Array | None:
-    """(N, 6) force and moment about the origin, world axes, by measured tensions and exciter; None: a cell is missing."""
+    """(N, 6) wrench about the origin, world axes, of cables and exciter; None: a cell is missing."""
     physics = parameters.physics(theta)
     channels = {c.device: c for c in run.channels if c.quantity == "tension"}
     if any(name not in channels for name in parameters.places.cables):
@@ -79,7 +79,9 @@ def applied_wrench(track: Track, run: Run, parameters: ParameterSet, theta: Arra
         tension = node_values(run.grid, channels[name].time, channels[name].values)
         force = tension * along / np.linalg.norm(along, axis=1, keepdims=True)
         total += np.concatenate([force, np.cross(hinge, force)], axis=1)
-    body = drive(run, parameters, theta).force @ exciter_wrench_map(parameters, theta).T if run.exciter else None
+    body = (
+        drive(run, parameters, theta).force @ exciter_wrench_map(parameters, theta).T if run.exciter else None
+    )
     if body is not None:
         force = np.einsum("nij,nj->ni", R, body[:, :3])
         moment = np.einsum("nij,nj->ni", R, body[:, 3:]) + np.cross(x, force)
@@ -94,7 +96,7 @@ def balance(track: Track, run: Run, parameters: ParameterSet, theta: Array) -> t
         return None
     gravity = parameters.physics(theta)[layout.GRAVITY : layout.GRAVITY + 3]
     momentum, weight = momentum_map(track), weight_map(track, gravity)
-    edges = np.arange(0, track.time.size, max(1, int(round(WINDOW / run.grid.step))))
+    edges = np.arange(0, track.time.size, max(1, round(WINDOW / run.grid.step)))
     impulse = cumulative_trapezoid(weight, dx=run.grid.step, axis=0, initial=0.0)
     given = cumulative_trapezoid(wrench, dx=run.grid.step, axis=0, initial=0.0)
     rows = np.diff(momentum[edges], axis=0) - np.diff(impulse[edges], axis=0)

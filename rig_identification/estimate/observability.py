@@ -33,7 +33,9 @@ def elements_covariance(problem: Problem, evaluation: Evaluation) -> Array:
 def invert_information(information: Array) -> Array:
     """Inverse of an information matrix, scaled to unit diagonal first."""
     scale = 1.0 / np.sqrt(np.diag(information))
-    return np.asarray(scale[:, None] * np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15) * scale)
+    return np.asarray(
+        scale[:, None] * np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15) * scale
+    )
 
 
 def believed_std(problem: Problem) -> Array:

@@ -103,10 +103,15 @@ class _Collector:
     parameters: list[Parameter] = field(default_factory=list)
 
     def physics(self, name: str, unit: str, nominal: float, std: float, index: int) -> None:
-        self.parameters.append(Parameter(name, unit, float(nominal), std, "physics", index))
+        self._add(Parameter(name, unit, float(nominal), std, "physics", index))
 
     def device(self, name: str, unit: str, std: float, index: int) -> None:
-        self.parameters.append(Parameter(name, unit, 0.0, std, "device", index))
+        self._add(Parameter(name, unit, 0.0, std, "device", index))
+
+    def _add(self, parameter: Parameter) -> None:
+        # What the lab is certain of is not free
+        if parameter.prior_std > 0.0:
+            self.parameters.append(parameter)
 
 
 def _rig_parameters(c: _Collector, rig: Rig, model: RigModel) -> None:
@@ -133,7 +138,11 @@ def _exciter_parameters(c: _Collector, rig: Rig, places: DeviceLayout) -> None:
     for a in range(3):
         position, turn = layout.EXCITER_POSITION + a, layout.EXCITER_ROTATION + a
         c.physics(
-            f"exciter.position.{AXES[a]}", "m", rig.exciter.position[a], tolerance["exciter_position"], position
+            f"exciter.position.{AXES[a]}",
+            "m",
+            rig.exciter.position[a],
+            tolerance["exciter_position"],
+            position,
         )
         c.physics(f"exciter.orientation.{AXES[a]}", "rad", 0.0, tolerance["exciter_orientation"], turn)
     c.physics("exciter.gain", "1", 1.0, tolerance["exciter_gain"], layout.EXCITER_GAIN)
@@ -206,11 +215,13 @@ class ParameterSet:
 
     def values(self, theta: Array) -> Array:
         """Free parameters in their own units."""
-        return np.array([p.nominal + p.prior_std * t for p, t in zip(self.free, theta[INERTIAL:], strict=True)])
+        return np.array(
+            [p.nominal + p.prior_std * t for p, t in zip(self.free, theta[INERTIAL:], strict=True)]
+        )
 
     def physics(self, theta: Array) -> Array:
         """The forward model's flat array."""
-        physics = self.model.physics.copy()
+        physics: Array = self.model.physics.copy()
         physics[layout.INERTIAL : layout.INERTIAL + INERTIAL] = linear_from_log_cholesky(theta[:INERTIAL])
         for p, value in zip(self.free, self.values(theta), strict=True):
             if p.kind == "physics":
@@ -269,9 +280,11 @@ class ParameterSet:
 
     def elements_jacobian(self, theta: Array) -> Array:
         """(10, 10) derivative of :meth:`elements` in the first ten entries."""
-        return complex_step_jacobian(
-            lambda t: elements_from_linear(linear_from_log_cholesky(t)), theta[:INERTIAL]
-        )
+
+        def elements(log_cholesky: Array) -> Array:
+            return elements_from_linear(linear_from_log_cholesky(log_cholesky))
+
+        return np.asarray(complex_step_jacobian(elements, theta[:INERTIAL]))
 
 
 def parameter_set(rig: Rig, model: RigModel, channels: set[str]) -> ParameterSet:

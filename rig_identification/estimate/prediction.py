@@ -1,4 +1,4 @@
-"""A run's samples against the forward model: residuals, and their exact derivatives in every free parameter."""
+"""A run's samples against the forward model: residuals and their exact derivatives in all parameters."""
 
 from __future__ import annotations
 
@@ -69,7 +69,10 @@ def start_basis(model: RigModel, state: State) -> Array:
 def read_device(
     bench: Bench, device: str, raw: Array, R: Array, own: Array, R_tracker_mean: Array | None = None
 ) -> sensors.Reading:
-    """Reading of one device at the nodes. own: flat array of DeviceLayout; R_tracker_mean: see sensors.mocap."""
+    """Reading of one device at the nodes.
+
+    own: flat array of DeviceLayout. R_tracker_mean: see sensors.mocap.
+    """
     rig, places = bench.rig, bench.parameters.places
     if device == "imu" and rig.imu is not None:
         turn = Rotation.from_quat(rig.imu.orientation).as_matrix()
@@ -152,23 +155,26 @@ def _channel_rows(
     columns = channel.columns
     predicted = value @ reading.values[:, columns]
     residual = channel.grouped - predicted
-    starts = 0 if motion.J is None else motion.J.shape[2]
+    _, _, motion_H, motion_D, motion_J = motion.derivatives
+    starts = motion_J.shape[2]
     in_raw = reading.in_raw[:, columns]
     nodes, width = in_raw.shape[:2]
-    total = (in_raw @ motion.J).reshape(nodes, width * starts)
+    total = (in_raw @ motion_J).reshape(nodes, width * starts)
     jacobian = (value @ total).reshape(groups, width, starts)
     device_columns, entries, scale = parameters.device_columns()
     first = device_start(parameters.places, channel.device)
     size = reading.in_device.shape[2]
     own_columns = np.zeros((groups, width, parameters.size))
-    own_map = (value @ reading.in_device[:, columns].reshape(nodes, width * size)).reshape(groups, width, size)
+    own_map = (value @ reading.in_device[:, columns].reshape(nodes, width * size)).reshape(
+        groups, width, size
+    )
     for column, entry, s in zip(device_columns, entries, scale, strict=True):
         if first <= entry < first + size:
             own_columns[:, :, column] = s * own_map[:, :, entry - first]
         elif clock is not None and entry == clock:
             own_columns[:, :, column] = -s * (slope @ reading.values[:, columns])
-    H = in_raw[channel.node] @ motion.H[channel.node]  # type: ignore[index]
-    D = in_raw[channel.node] @ motion.D[channel.node]  # type: ignore[index]
+    H = in_raw[channel.node] @ motion_H[channel.node]
+    D = in_raw[channel.node] @ motion_D[channel.node]
     return residual, np.concatenate([jacobian, own_columns], axis=2), H, D
 
 

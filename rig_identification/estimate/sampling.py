@@ -46,7 +46,7 @@ def _stencil(grid: Grid, time: Array) -> tuple[Index, Array, Array]:
 
 
 def interpolation(grid: Grid, time: Array, group: Index, groups: int) -> tuple[csr_matrix, csr_matrix]:
-    """Matrices (groups, nodes): mean over each group of the interpolated value, and of its time derivative."""
+    """Matrices (groups, nodes): mean over each group of the interpolated value, and of its rate."""
     first, weights, slopes = _stencil(grid, time)
     share = 1.0 / np.bincount(group, minlength=groups)[group]
     rows = np.repeat(group, 4)

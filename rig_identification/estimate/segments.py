@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ def pieces(run: Run, length: float = PIECE) -> tuple[Run, ...]:
     nodes = run.grid.nodes
     count = max(1, round(run.grid.duration / length))
     edges = np.linspace(0, nodes - 1, count + 1).astype(int)
-    return tuple(run.between(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True))
+    return tuple(run.between(int(a), int(b)) for a, b in pairwise(edges))
 
 
 def solve_in_pieces(
@@ -65,7 +66,7 @@ SHORT_PIECE = 2.0
 
 
 def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart:
-    """Find the free stretch: each short piece is fitted by its start state alone, and the bad ones are driven.
+    """Find the free stretch: short pieces are fitted by start states alone, and the bad ones are driven.
 
     The yardstick is the better half of the pieces that move; a piece at rest fits always and says nothing.
     """
@@ -88,6 +89,8 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
     a = round((first.offset - run.offset) / step)
     b = round((last.offset - run.offset) / step) + last.grid.nodes - 1
     held = tuple(
-        (piece.offset, piece.offset + piece.grid.duration) for piece, bad in zip(cut, driven, strict=True) if bad
+        (piece.offset, piece.offset + piece.grid.duration)
+        for piece, bad in zip(cut, driven, strict=True)
+        if bad
     )
     return FreePart(run.between(a, b), first.offset, last.offset + last.grid.duration, held)

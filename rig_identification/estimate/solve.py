@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import START_UNIT, Bench, Linearised, linearise_run, model_at, start_basis
+from rig_identification.estimate.prediction import (
+    START_UNIT,
+    Bench,
+    Linearised,
+    linearise_run,
+    model_at,
+    start_basis,
+)
 from rig_identification.estimate.rest_evidence import (
     RestEvidence,
     RestLinearised,
@@ -95,9 +102,7 @@ def evaluate(problem: Problem, point: Point) -> Evaluation | None:
 
     def one(item: tuple[Run, State, Array | None]) -> Linearised | None:
         run, start, latent = item
-        return linearise_run(
-            bench, run, point.theta, start, extra_noise=problem.extra_noise, latent=latent
-        )
+        return linearise_run(bench, run, point.theta, start, extra_noise=problem.extra_noise, latent=latent)
 
     with ThreadPoolExecutor(max_workers=2) as pool:
         runs = list(pool.map(one, zip(problem.runs, point.starts, latents, strict=True)))

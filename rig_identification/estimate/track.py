@@ -42,7 +42,7 @@ class Track:
 
 
 def wrench_noise(mass: float, gravity: float, size: float, step: float, share: float) -> Array:
-    """(6, 6) covariance of a random wrench of ``share`` of the body's weight, white on the scale of a block."""
+    """(6, 6) covariance of a random wrench of ``share`` of the body's weight, white from block to block."""
     force = (share * mass * gravity) ** 2 * (BLOCK / step)
     return np.diag([force] * 3 + [force * size**2] * 3)
 
@@ -52,7 +52,9 @@ def start_covariance(spread: float = 0.05, speed: float = 0.2) -> Array:
     return np.diag([spread**2] * 6 + [speed**2] * 6)
 
 
-def track(bench: Bench, run: Run, theta: Array, start: State, start_spread: Array, noise: Array) -> Track | None:
+def track(
+    bench: Bench, run: Run, theta: Array, start: State, start_spread: Array, noise: Array
+) -> Track | None:
     """Track a run from ``start``; None where the motion cannot be followed.
 
     start_spread (12, 12): covariance of the start. noise (6, 6): covariance of the random
@@ -60,7 +62,7 @@ def track(bench: Bench, run: Run, theta: Array, start: State, start_spread: Arra
     """
     model = model_at(bench.parameters, theta)
     nodes = run.grid.nodes
-    block = max(8, int(round(BLOCK / run.grid.step)))
+    block = max(8, round(BLOCK / run.grid.step))
     states, rotations = np.zeros((nodes, 12)), np.zeros((nodes, 3, 3))
     covariance, wrenches = np.zeros((nodes, 12, 12)), np.zeros((nodes, 6))
     outputs = np.zeros((nodes, layout.OUT_TENSION + model.cables))
@@ -84,13 +86,13 @@ def track(bench: Bench, run: Run, theta: Array, start: State, start_spread: Arra
             rotations[node] = moved.R_world_body
         here = slice(first, last + 1)
         covariance[here], wrenches[here] = filtered, wrench
-        change = np.einsum("nij,nj->ni", lin.motion.H, corrections) + np.einsum(
-            "nij,nj->ni", lin.motion.D, wrench
-        )
+        _, _, H, D, _ = lin.motion.derivatives
+        change = np.einsum("nij,nj->ni", H, corrections) + np.einsum("nij,nj->ni", D, wrench)
         outputs[here] = lin.motion.outputs + change
         # The last node's rows were used in this block: hand over one node earlier
         x = states[last]
         state = on_cables(model, State(x[:3], rotations[last], x[6:9], x[9:12]))
         P = filtered[-1]
         first = last
-    return Track(run.grid.step * np.arange(nodes), states, rotations, covariance, wrenches, outputs)
+    time = np.asarray(run.grid.step * np.arange(nodes), dtype=np.float64)
+    return Track(time, states, rotations, covariance, wrenches, outputs)

@@ -41,7 +41,8 @@ def residual_witnesses(run: Run, linearised: Linearised, residual: Array) -> lis
             rate = (np.count_nonzero(rows) - 1) / max(float(np.ptp(channel.time)), 1e-9)
             axis = "xyz"[a] if channel.width > 1 else None
             out += [
-                Witness(run.recording.name, channel.device, axis, band) for band in bands(residual[rows], rate)
+                Witness(run.recording.name, channel.device, axis, band)
+                for band in bands(residual[rows], rate)
             ]
     return out
 
@@ -55,7 +56,9 @@ def predictive_residual(fitted: Fitted, linearised: Linearised, full: Linearised
     """
     p = fitted.problem.bench.parameters.size
     information = fitted.evaluation.information
-    shared = information[:p, :p] - information[:p, p:] @ np.linalg.solve(information[p:, p:], information[p:, :p])
+    shared = information[:p, :p] - information[:p, p:] @ np.linalg.solve(
+        information[p:, p:], information[p:, :p]
+    )
     normal = full.jacobian.T @ full.jacobian
     normal[:p, :p] += shared
     step = np.linalg.lstsq(normal, full.jacobian.T @ full.residual, rcond=1e-14)[0]
@@ -87,17 +90,20 @@ def judge(
         if worst.band.log10_p < limit:
             where = worst.channel + (f" {worst.axis}" if worst.axis else "")
             reasons.append(
-                f"the residual of {where} in {worst.recording} is not noise: between {worst.band.low:.2g} and "
-                f"{worst.band.high:.2g} Hz it has {worst.band.power:.3g} times the power of white noise"
+                f"the residual of {where} in {worst.recording} is not noise: "
+                f"between {worst.band.low:.2g} and {worst.band.high:.2g} Hz "
+                f"it has {worst.band.power:.3g} times the power of white noise"
             )
     if not fitted.converged:
         reasons.append("the fit did not settle")
     if beyond:
         names = ", ".join(p.name for p in beyond[:3]) + (" and others" if len(beyond) > 3 else "")
         reasons.append(f"{names} would have to lie more than {ordinary:.0f} tolerances from the description")
-    scores = f"Held-out error {holdout_error:.3g}, fitted {training_error:.3g} (1 is a perfect model)." if (
-        holdout_error is not None
-    ) else f"Fitted error {training_error:.3g} (1 is a perfect model); no held-out run."
+    scores = (
+        f"Held-out error {holdout_error:.3g}, fitted {training_error:.3g} (1 is a perfect model)."
+        if (holdout_error is not None)
+        else f"Fitted error {training_error:.3g} (1 is a perfect model); no held-out run."
+    )
     judged = "Judged by the residuals alone; no missing physics was searched for."
     if reasons:
         return Mismatch("unexplained", f"{'; '.join(reasons).capitalize()}. {scores} {judged}")

@@ -48,6 +48,10 @@ def subtract_frame(total: InertialEstimate, frame: CarryingFrame) -> InertialEst
     # A centre that is not determined leaves no inertia about the other centre determined
     for axis, name in enumerate(("cx", "cy", "cz")):
         if name in lost:
-            touched = {0: ("Jxy", "Jxz", "Jyy", "Jzz"), 1: ("Jxx", "Jxy", "Jyz", "Jzz"), 2: ("Jxx", "Jxz", "Jyy", "Jyz")}
+            touched = {
+                0: ("Jxy", "Jxz", "Jyy", "Jzz"),
+                1: ("Jxx", "Jxy", "Jyz", "Jzz"),
+                2: ("Jxx", "Jxz", "Jyy", "Jyz"),
+            }
             lost |= set(touched[axis])
     return InertialEstimate(rest(both), map_ @ covariance @ map_.T, tuple(n for n in ELEMENTS if n in lost))

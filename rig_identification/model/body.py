@@ -83,7 +83,18 @@ def log_cholesky_from_linear(linear: Array) -> Array:
     a = np.log(U[3, 3])
     V = U / U[3, 3]
     return np.array(
-        [a, np.log(V[0, 0]), np.log(V[1, 1]), np.log(V[2, 2]), V[0, 1], V[1, 2], V[0, 2], V[0, 3], V[1, 3], V[2, 3]]
+        [
+            a,
+            np.log(V[0, 0]),
+            np.log(V[1, 1]),
+            np.log(V[2, 2]),
+            V[0, 1],
+            V[1, 2],
+            V[0, 2],
+            V[0, 3],
+            V[1, 3],
+            V[2, 3],
+        ]
     )
 
 

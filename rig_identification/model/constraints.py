@@ -34,7 +34,11 @@ def cable_length_and_rate(physics, offset, x, R, gradient):  # type: ignore[no-u
 
     dl/dt equals gradient . (v, w).
     """
-    bx, by, bz = physics[offset + BODY_POINT], physics[offset + BODY_POINT + 1], physics[offset + BODY_POINT + 2]
+    bx, by, bz = (
+        physics[offset + BODY_POINT],
+        physics[offset + BODY_POINT + 1],
+        physics[offset + BODY_POINT + 2],
+    )
     d0 = physics[offset + CEILING_POINT] - x[0] - (R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz)
     d1 = physics[offset + CEILING_POINT + 1] - x[1] - (R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz)
     d2 = physics[offset + CEILING_POINT + 2] - x[2] - (R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz)

@@ -27,6 +27,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.effects.all import add_effects
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
     AXIAL_STIFFNESS,
@@ -47,7 +48,6 @@ from rig_identification.model.layout import (
     SLACK,
     VELOCITY,
 )
-
 
 #: Softness of a rigid cable at acceleration level, m/s^2 per N. It moves nothing that can be measured
 #: (3e-7 m/s^2 under 3 kN, and lengths are restored at each step); where more cables than needed hold
@@ -217,6 +217,7 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
                 r[row] = 0.0
             else:
                 r[row] = tension
+    add_effects(physics, modes, x, R, K, r)
 
 
 @njit(cache=True)

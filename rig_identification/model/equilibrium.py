@@ -94,9 +94,11 @@ class Rest:
 
 
 def design_pose(model: RigModel) -> State:
-    """A pose near the cables' lengths with the body upright below the ceiling: a start for :func:`find_rest`."""
+    """A pose near the cables' lengths, the body upright below the ceiling: where :func:`find_rest` starts."""
     n = model.cables
-    blocks = [model.physics[layout.cable_offset(i) : layout.cable_offset(i) + layout.CABLE_SIZE] for i in range(n)]
+    blocks = [
+        model.physics[layout.cable_offset(i) : layout.cable_offset(i) + layout.CABLE_SIZE] for i in range(n)
+    ]
     ceiling, body = np.array([b[0:3] for b in blocks]), np.array([b[3:6] for b in blocks])
     length = np.array([b[layout.LENGTH] for b in blocks])
     below = np.mean(ceiling - body, axis=0) - [0.0, 0.0, np.mean(length)]

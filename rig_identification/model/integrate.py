@@ -47,7 +47,7 @@ WRENCH = 6
 
 @njit(cache=True, nogil=True)
 def solve(physics, modes, mount, x, R, force, wrench, K, r, inverse, z):  # type: ignore[no-untyped-def]
-    """z = K^-1 r; returns False where the rig is singular. ``inverse`` keeps K^-1 where it has room for it."""
+    """z = K^-1 r; False where the rig is singular. ``inverse`` keeps K^-1 where it has room for it."""
     assemble(physics, modes, mount, x, R, force, wrench, K, r)
     if inverse.shape[0] == 0:
         z[:] = r
@@ -262,7 +262,6 @@ def _switch_cables(physics, modes, x, reference, z, can_slacken):  # type: ignor
     return changed
 
 
-
 @njit(cache=True, nogil=True)
 def propagate(  # type: ignore[no-untyped-def]
     physics,
@@ -288,7 +287,7 @@ def propagate(  # type: ignore[no-untyped-def]
     D,
     J,
 ):
-    """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N where all went well).
+    """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
 
     x (12,) and reference (3, 3): start, destroyed. forces, force_rates (N, 3): exciter force
     in its frame and its rate at the nodes, linear between. wrenches (N, 6): further wrench,

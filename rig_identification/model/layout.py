@@ -49,6 +49,6 @@ def cable_offset(index: int) -> int:
     return CABLES + CABLE_SIZE * index
 
 
-def physics_size(cables: int) -> int:
-    """Length of ``physics`` without effects."""
+def effects_offset(cables: int) -> int:
+    """First entry of the effects' block (effects/place.py) in ``physics``."""
     return CABLES + CABLE_SIZE * cables

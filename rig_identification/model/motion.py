@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.model import layout
 from rig_identification.model.body import linear_from_elements
+from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.constraints import project_columns, project_state
 from rig_identification.model.integrate import propagate
 from rig_identification.rig import Rig
@@ -36,14 +37,16 @@ class RigModel:
         return replace(self, physics=np.ascontiguousarray(physics, dtype=float))
 
 
-def rig_model(rig: Rig, elements: Array, *, axial_stiffness: float | None = None, rods: bool = False) -> RigModel:
+def rig_model(
+    rig: Rig, elements: Array, *, axial_stiffness: float | None = None, rods: bool = False
+) -> RigModel:
     """Forward model of a described rig carrying a body.
 
     elements (10,): m, c, J about the centre of mass (see body.py). axial_stiffness: EA in N;
     None: inextensible. rods: cables may push as well (the thesis' rods).
     """
     n = len(rig.cables)
-    physics = np.zeros(layout.physics_size(n))
+    physics = np.zeros(layout.effects_offset(n) + EFFECTS_SIZE)
     physics[layout.GRAVITY : layout.GRAVITY + 3] = (0.0, 0.0, -rig.gravity)
     physics[layout.INERTIAL : layout.INERTIAL + 10] = linear_from_elements(np.asarray(elements, dtype=float))
     physics[layout.EXCITER_GAIN] = 1.0
@@ -138,7 +141,14 @@ class Motion:
     @property
     def complete(self) -> bool:
         """Whether every node was reached."""
-        return self.nodes == self.states.shape[0]
+        return bool(self.nodes == self.states.shape[0])
+
+    @property
+    def derivatives(self) -> tuple[Array, Array, Array, Array, Array]:
+        """A, B, H, D, J of a motion that was computed with them."""
+        if self.A is None or self.B is None or self.H is None or self.D is None or self.J is None:
+            raise ValueError("this motion was computed without derivatives")
+        return self.A, self.B, self.H, self.D, self.J
 
     def state(self, node: int) -> State:
         """State at one node."""

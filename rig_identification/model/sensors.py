@@ -27,7 +27,7 @@ GRAVITY = slice(layout.OUT_GRAVITY, layout.OUT_GRAVITY + 3)
 
 @dataclass(frozen=True)
 class Reading:
-    """Values (N, w), their derivative in the raw outputs (N, w, 18 + n), and in the device's numbers (N, w, q)."""
+    """Values (N, w), derivatives in the raw outputs (N, w, 18 + n) and in the device's numbers (N, w, q)."""
 
     values: Array
     in_raw: Array
@@ -110,7 +110,9 @@ def inclinometer(raw: Array, orientation: Array, device: Array) -> Reading:
     slope = 1.0 / np.sqrt(np.maximum(1.0 - sine**2, 1e-12))
     in_up = slope[:, :, None] * turn[:, :2].T[None]
     in_raw = np.zeros((nodes, 2, width))
-    in_raw[:, :, GRAVITY] = -(in_up - np.einsum("nij,nj->ni", in_up, up)[:, :, None] * up[:, None, :]) / size[:, :, None]
+    in_raw[:, :, GRAVITY] = (
+        -(in_up - np.einsum("nij,nj->ni", in_up, up)[:, :, None] * up[:, None, :]) / size[:, :, None]
+    )
     # d(axis) = d x axis: up . (d x axis) = d . (axis x up)
     turned = np.cross(turn[:, :2].T[None], up[:, None, :])
     in_device = slope[:, :, None] * turned @ left_jacobian(device)
