@@ -55,12 +55,14 @@ setup(
     ],
     zip_safe=False,
     install_requires=[
+        'backports.zstd>=1.0; python_version < "3.14"',
         "jinja2>=3.1",
+        "lz4>=4.3",
         "numba>=0.59",
         "numpy>=1.24",
         "ruamel.yaml>=0.18",
         "rich>=13.0",
-        "rosbags>=0.10",
+        "rosbags>=0.11,<0.12",
         "scipy>=1.11",
     ],
     extras_require={
