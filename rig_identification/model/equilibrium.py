@@ -19,6 +19,8 @@ from rig_identification.model import layout
 from rig_identification.model.arithmetic import STEP
 from rig_identification.model.constraints import cable_length_and_rate, update_reference
 from rig_identification.model.dynamics import assemble, rotation
+from rig_identification.model.effects.cable_mass import weight_below_cell
+from rig_identification.model.effects.place import LINEAR_DENSITY
 from rig_identification.model.motion import Input, RigModel, State, on_cables, simulate
 from rig_identification.model.so3 import skew
 
@@ -80,6 +82,16 @@ def rest_jacobian(physics, modes, mount, x, reference, tension, directions):  # 
         elif directions[c - size] >= 0:
             pc[directions[c - size]] = physics[directions[c - size]]
     return in_pose, in_physics
+
+
+def own_weights(model: RigModel, x: Array, R: Array, *, per_density: bool = False) -> Array:
+    """(n,) N: what each cable's own weight adds at its load cell; per kg/m where asked (it is linear)."""
+    block = layout.effects_offset(model.cables)
+    physics = model.physics.copy()
+    if per_density:
+        physics[block + LINEAR_DENSITY] = 1.0
+    modes = model.modes
+    return np.array([weight_below_cell(physics, block, modes, i, x, R) for i in range(model.cables)])
 
 
 @dataclass(frozen=True)
@@ -164,7 +176,7 @@ def find_rest(
     outputs[0, :3] = x[:3]
     outputs[0, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -down
     outputs[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] = down
-    outputs[0, layout.OUT_TENSION :] = tension
+    outputs[0, layout.OUT_TENSION :] = tension + own_weights(model, x, R)
     J = np.zeros((1, layout.OUT_TENSION + n, chosen.size))
     J[0, layout.OUT_POSITION : layout.OUT_POSITION + 3] = implicit[:3]
     J[0, layout.OUT_ROTATION : layout.OUT_ROTATION + 3] = implicit[3:6]
@@ -175,5 +187,8 @@ def find_rest(
     J[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] = in_gravity
     J[0, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -in_gravity
     J[0, layout.OUT_TENSION :] = implicit[6:]
+    density = layout.effects_offset(n) + LINEAR_DENSITY
+    for k in np.flatnonzero(chosen == density):
+        J[0, layout.OUT_TENSION :, k] += own_weights(model, x, R, per_density=True)
     state = State(x[:3].copy(), R, np.zeros(3), np.zeros(3))
     return Rest(state, tension, outputs, J, converged)

@@ -22,6 +22,7 @@ from rig_identification.model.constraints import (
     update_reference,
 )
 from rig_identification.model.dynamics import assemble, rotation, rotation_rate
+from rig_identification.model.effects.cable_mass import weight_below_cell
 from rig_identification.model.layout import (
     CABLE_SIZE,
     CABLES,
@@ -76,6 +77,8 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
     rc = np.empty(size, dtype=np.complex128)
     change = np.empty(size)
     first = 12 + WRENCH
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    weighty = physics.shape[0] > block
     for column in range(12 + directions.shape[0]):
         target = column if column < 12 else column + WRENCH
         if column < 12:
@@ -99,6 +102,9 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
             for j in range(size):
                 total += inverse[i, j] * change[j]
             out[i, target] = total
+        if weighty:
+            for i in range(size - 6):
+                out[6 + i, target] += weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
         if column < 12:
             xc[column] = x[column]
         elif directions[column - 12] == EXCITER_CLOCK:
@@ -187,8 +193,9 @@ def _absorb_rotation_columns(x, columns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_outputs(physics, R, x, z, out):  # type: ignore[no-untyped-def]
+def _write_outputs(physics, modes, R, x, z, out):  # type: ignore[no-untyped-def]
     n = z.shape[0] - 6
+    block = CABLES + CABLE_SIZE * n
     for i in range(3):
         out[OUT_POSITION + i] = x[i]
         out[OUT_ROTATION + i] = 0.0
@@ -201,6 +208,8 @@ def _write_outputs(physics, R, x, z, out):  # type: ignore[no-untyped-def]
         out[OUT_GRAVITY + i] = weight
     for i in range(n):
         out[OUT_TENSION + i] = z[6 + i]
+        if physics.shape[0] > block:
+            out[OUT_TENSION + i] += weight_below_cell(physics, block, modes, i, x, R)
 
 
 @njit(cache=True, nogil=True)
@@ -356,7 +365,7 @@ def propagate(  # type: ignore[no-untyped-def]
                 if s == 0 and sub == 0:
                     nodes_x[node] = y
                     nodes_R[node] = R
-                    _write_outputs(physics, R, y, z, nodes_out[node])
+                    _write_outputs(physics, modes, R, y, z, nodes_out[node])
                     if sensitivity:
                         _write_output_columns(physics, R, dz, directions, out_columns)
                         H[node] = out_columns[:, :12]

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.model import layout
 from rig_identification.model.body import linear_from_elements
-from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.constraints import project_columns, project_state
+from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.integrate import propagate
 from rig_identification.rig import Rig
 
@@ -59,6 +59,7 @@ def rig_model(
         physics[o + layout.CEILING_POINT : o + layout.CEILING_POINT + 3] = cable.ceiling_point
         physics[o + layout.BODY_POINT : o + layout.BODY_POINT + 3] = cable.body_point
         physics[o + layout.LENGTH] = cable.length
+        physics[o + layout.CELL_AT_CEILING] = float(cable.load_cell == "ceiling")
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic

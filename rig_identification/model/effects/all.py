@@ -1,0 +1,29 @@
+"""Every effect on the motion, called in turn: adding one is adding its file and its line here."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from rig_identification.model.effects.air_added_mass import add_air_added_mass
+from rig_identification.model.effects.air_drag import add_air_drag
+from rig_identification.model.effects.cable_mass import add_cable_mass
+from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
+from rig_identification.model.effects.hinge_damping import add_hinge_damping
+from rig_identification.model.effects.hinge_friction import add_hinge_friction
+from rig_identification.model.effects.tether import add_tether
+from rig_identification.model.layout import CABLE_SIZE, CABLES
+
+
+@njit(cache=True)
+def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
+    """Add all effects to K z = r."""
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    if physics.shape[0] <= block:
+        return
+    add_hinge_damping(physics, block, modes, x, R, r)
+    add_hinge_friction(physics, block, modes, x, R, r)
+    add_air_drag(physics, block, x, R, r)
+    add_air_added_mass(physics, block, x, K, r)
+    add_exciter_rotor(physics, block, x, R, K, r)
+    add_cable_mass(physics, block, modes, x, R, K, r)
+    add_tether(physics, block, x, R, r)

@@ -1,0 +1,66 @@
+"""What moments in the cables' hinges do to the body (derived in hinge_damping.py)."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.layout import (
+    BODY_POINT,
+    CABLE_SIZE,
+    CABLES,
+    CEILING_POINT,
+    RATE,
+    SLACK,
+    VELOCITY,
+)
+
+#: Rate (rad/s) below which rubbing grows with the rate instead of jumping: dry bearings creep there.
+CREEP = 1e-3
+
+
+@njit(cache=True)
+def _law(viscous, rubbing, a, b, c):  # type: ignore[no-untyped-def]
+    """Moment per unit of relative rate (a, b, c)."""
+    return viscous + rubbing * reciprocal(root(a * a + b * b + c * c + CREEP * CREEP))
+
+
+@njit(cache=True)
+def add_hinge_moments(physics, modes, x, R, viscous, rubbing, r):  # type: ignore[no-untyped-def]
+    """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in every hinge."""
+    wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
+    v0, v1, v2 = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
+    vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
+    vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2
+    vz = R[0, 2] * v0 + R[1, 2] * v1 + R[2, 2] * v2
+    for i in range(modes.shape[0]):
+        if modes[i] == SLACK:
+            continue
+        o = CABLES + CABLE_SIZE * i
+        bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
+        d0 = x[0] - physics[o + CEILING_POINT]
+        d1 = x[1] - physics[o + CEILING_POINT + 1]
+        d2 = x[2] - physics[o + CEILING_POINT + 2]
+        ex = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 + bx
+        ey = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 + by
+        ez = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 + bz
+        per_length = reciprocal(root(ex * ex + ey * ey + ez * ez))
+        ex, ey, ez = ex * per_length, ey * per_length, ez * per_length
+        sx = (vx + wy * bz - wz * by) * per_length
+        sy = (vy + wz * bx - wx * bz) * per_length
+        sz = (vz + wx * by - wy * bx) * per_length
+        ox, oy, oz = ey * sz - ez * sy, ez * sx - ex * sz, ex * sy - ey * sx
+        ax, ay, az = wx - ox, wy - oy, wz - oz
+        lower = _law(viscous, rubbing, ax, ay, az)
+        upper = _law(viscous, rubbing, ox, oy, oz)
+        # Net moment on the cable, then the force across it at the body's hinge
+        mx, my, mz = lower * ax - upper * ox, lower * ay - upper * oy, lower * az - upper * oz
+        fx = -(ey * mz - ez * my) * per_length
+        fy = -(ez * mx - ex * mz) * per_length
+        fz = -(ex * my - ey * mx) * per_length
+        r[0] += fx
+        r[1] += fy
+        r[2] += fz
+        r[3] += by * fz - bz * fy - lower * ax
+        r[4] += bz * fx - bx * fz - lower * ay
+        r[5] += bx * fy - by * fx - lower * az

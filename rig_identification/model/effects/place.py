@@ -1,0 +1,34 @@
+"""Where each effect's numbers stand in the effects' block of ``physics`` (layout.py).
+
+All zero means: not there. The reference pose is a constant of the session, not a parameter.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from rig_identification.model.layout import CABLE_SIZE, CABLES
+
+DAMPING = 0  # N m s/rad
+FRICTION = 1  # N m
+DRAG_AREA = 2  # m^2
+ADDED_MASS = 3  # kg
+ROTOR_MASS = 4  # kg
+LINEAR_DENSITY = 5  # kg/m
+TETHER_STIFFNESS = 6  # 3: N/m, world axes
+TETHER_PULL = 9  # 3: N, world axes
+TETHER_POINT = 12  # 3: m, body
+REFERENCE_POSITION = 15  # 3: m, world
+REFERENCE_ROTATION = 18  # 9: rotation matrix, row by row
+EFFECTS_SIZE = 27
+
+
+def effects_block(cables: int) -> int:
+    """First entry of the effects' block."""
+    return CABLES + CABLE_SIZE * cables
+
+
+@njit(cache=True, inline="always")
+def active(value):  # type: ignore[no-untyped-def]
+    """Whether a parameter, or its derivative, is asked for."""
+    return value.real != 0.0 or value.imag != 0.0
