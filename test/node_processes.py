@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import os
 import random
@@ -14,15 +15,22 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rclpy
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from ruamel.yaml import YAML
 from std_srvs.srv import Trigger
 
 import rig_identification
+from rig_identification.live.body_tracker import BodyTracker
+from rig_identification.live.plant import Plant
+from rig_identification.model.motion import rig_model
+from rig_identification.session.fields import Fields
+from rig_identification.session.rig_description import rig_from_fields
 
 with warnings.catch_warnings():  # the wheels' lark imports a deprecated module
     warnings.simplefilter("ignore", DeprecationWarning)
@@ -56,10 +64,25 @@ SIMULATOR = [
 ]  # fmt: skip
 
 
+@functools.cache
+def compile_once() -> None:
+    """Compile what the nodes run, here and once: several processes would compile it at the same time."""
+    top = YAML(typ="safe").load(RIG)["/**"]["ros__parameters"]
+    rig = rig_from_fields(Fields(Path("rig"), "", top))
+    plant = Plant(rig_model(rig, np.array(BODY)), 1)
+    plant.advance(0.01)
+    tracker = BodyTracker(rig)
+    tracker.add_inclination(np.array([1_000_000]), np.zeros((1, 2)))
+    for cable in rig.cables:
+        tracker.add_tension(cable.name, np.array([1_000_000]), np.array([[2500.0]]))
+    tracker.add_imu(1_000_000 * np.arange(1, 60), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 9.8], (59, 1)))
+
+
 class Graph:
     """Nodes as processes, all in namespace ``/rig`` with the same rig description."""
 
     def __init__(self, folder: Path) -> None:
+        compile_once()
         self.folder = folder
         self.domain = next(_DOMAINS) % 100 + 1
         self.rig_file = folder / "rig.yaml"
@@ -95,10 +118,15 @@ class Graph:
         return process.returncode, output
 
     def close(self) -> None:
-        """End what still runs."""
+        """End what still runs; a process that has others of its own gets the time to end them."""
         for process in self.processes:
-            process.kill()
-            process.communicate()
+            process.terminate()
+        for process in self.processes:
+            try:
+                process.communicate(timeout=20.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate(timeout=20.0)
 
 
 class Probe:

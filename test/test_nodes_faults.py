@@ -119,7 +119,7 @@ def test_a_signal_while_fitting_ends_fit_and_node(graph: Graph, probe: Probe) ->
     simulated(graph)
     identifier = graph.start("identifier", "recording.kind:=static")
     heard = probe.listen(WrenchStamped, "cable_1/wrench")
-    probe.spin_until(lambda: heard, 30.0, "the sensors")
+    probe.spin_until(lambda: heard, 120.0, "the sensors")
     assert probe.call("identifier/start_window").success
     probe.spin_for(1.0)
     assert probe.call("identifier/stop_window").success
@@ -137,7 +137,7 @@ def test_a_sensor_killed_and_restarted_leaves_a_gap_with_a_name(graph: Graph, pr
     recorder = graph.start("recorder", f"folder:={folder}")
     diagnostics = Diagnostics(probe)
     heard = probe.listen(Imu, "imu/data_raw")
-    probe.spin_until(lambda: len(heard) > 50, 30.0, "the imu")
+    probe.spin_until(lambda: len(heard) > 50, 120.0, "the imu")
     assert probe.call("recorder/start").success
     probe.spin_for(1.0)
     nodes["imu"].kill()
@@ -160,7 +160,7 @@ def test_a_node_started_twice_and_one_started_late_are_named(graph: Graph, probe
     graph.start("imu", "simulation.rate:=100.0", "simulation.seed:=7")
     diagnostics = Diagnostics(probe)
     heard = probe.listen(Imu, "imu/data_raw")
-    probe.spin_until(lambda: len(heard) > 50, 30.0, "the imu")
+    probe.spin_until(lambda: len(heard) > 50, 120.0, "the imu")
     late = graph.start("identifier")
     probe.spin_until(
         lambda: diagnostics.says("identifier: /rig/imu/data_raw", "2 publishers"), 20.0, "the word"
@@ -188,7 +188,7 @@ def test_a_silent_cable_and_a_still_window_are_said(graph: Graph, probe: Probe) 
     graph.start("imu", "simulation.rate:=100.0")
     identifier = graph.start("identifier", "recording.kind:=dynamic")
     heard = probe.listen(WrenchStamped, "cable_1/wrench")
-    probe.spin_until(lambda: heard, 30.0, "the sensors")
+    probe.spin_until(lambda: heard, 120.0, "the sensors")
     assert probe.call("identifier/start_window").success
     probe.spin_for(2.5)
     stopped = probe.call("identifier/stop_window")
@@ -207,7 +207,7 @@ def test_odd_stamps_and_numbers_are_refused_and_counted(graph: Graph, probe: Pro
     tracker, identifier = graph.start("tracker"), graph.start("identifier")
     diagnostics = Diagnostics(probe)
     poses = probe.listen(Odometry, "odometry")
-    probe.spin_until(lambda: len(poses) > 100, 40.0, "the tracker")
+    probe.spin_until(lambda: len(poses) > 100, 120.0, "the tracker")
     cable = probe.node.create_publisher(WrenchStamped, "cable_2/wrench", 10)
     imu = probe.node.create_publisher(Imu, "imu/data_raw", 10)
     probe.spin_until(lambda: cable.get_subscription_count() >= 2 and imu.get_subscription_count() >= 2, 10.0)
@@ -243,7 +243,7 @@ def test_a_client_that_dies_while_it_waits_harms_no_one(graph: Graph, probe: Pro
     simulated(graph)
     identifier = graph.start("identifier", "recording.kind:=static")
     heard = probe.listen(WrenchStamped, "cable_1/wrench")
-    probe.spin_until(lambda: heard, 30.0, "the sensors")
+    probe.spin_until(lambda: heard, 120.0, "the sensors")
     assert probe.call("identifier/start_window").success
     probe.spin_for(1.0)
     assert probe.call("identifier/stop_window").success

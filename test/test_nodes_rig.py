@@ -55,7 +55,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
         wrench = probe.listen(WrenchStamped, "generalized_wrench")
         markers = probe.listen(MarkerArray, "markers")
         truth = probe.listen(Odometry, "ground_truth/odometry")
-        probe.spin_until(lambda: odometry and wrench and markers and truth, 60.0, "the graph")
+        probe.spin_until(lambda: odometry and wrench and markers and truth, 120.0, "the graph")
         record(probe, 2.0, kind="static")
         probe.set("rig_simulator", dummy__mass=50.0, dummy__position=DUMMY)
         assert probe.call("rig_simulator/come_to_rest").success

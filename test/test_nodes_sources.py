@@ -73,7 +73,7 @@ def test_a_serial_amplifier_is_read_unplugged_and_plugged_in_again(graph: Graph,
         probe.listen(WrenchStamped, "cable_4/wrench"),
         probe.listen(WrenchStamped, "exciter/wrench"),
     )
-    probe.spin_until(lambda: len(cable) > 50 and len(exciter) > 50, 20.0, "the amplifier's lines")
+    probe.spin_until(lambda: len(cable) > 50 and len(exciter) > 50, 120.0, "the amplifier's lines")
     assert cable[-1].wrench.force.z == pytest.approx(4000.5)
     assert [getattr(exciter[-1].wrench.force, axis) for axis in "xyz"] == pytest.approx(
         [5000.5, 6000.5, -7499.5]
@@ -100,12 +100,12 @@ def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> No
         "inclinometer", "source:=file", f"file.path:={file}", "line.time_column:=0", "line.time_scale:=0.001",
         "line.columns:=[1, 2]",
     )  # fmt: skip
-    probe.spin_until(lambda: len(angles) > 10, 20.0, "the file's first lines")
-    begun = time.monotonic()
+    probe.spin_until(lambda: len(angles) > 10, 120.0, "the file's first lines")
     probe.spin_until(lambda: angles[-1].vector.x > 0.1485, 10.0, "the file's last line")
-    assert time.monotonic() - begun > 1.5  # 3 s of file, some of them over before
+    now = time.time_ns()
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in angles]
     assert {b - a for a, b in itertools.pairwise(stamps)} == {20_000_000}
+    assert 0 <= now - stamps[-1] < 3e9  # no line comes before it is due
     assert angles[-1].vector.y == pytest.approx(-2.0 * angles[-1].vector.x)
 
 
@@ -156,7 +156,7 @@ def test_one_command_brings_the_simulated_rig_up_and_down(graph: Graph, probe: P
     )
     graph.processes.append(process)
     heard = probe.listen(Imu, "imu/data_raw")
-    probe.spin_until(lambda: len(heard) > 200, 60.0, "the simulated rig")
+    probe.spin_until(lambda: len(heard) > 200, 120.0, "the simulated rig")
     assert graph.end(process, signal.SIGINT, within=40.0) == (0, "")
     (run,) = read_session(folder).recordings
     assert len(run.tension) == 4

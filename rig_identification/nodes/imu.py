@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.errors import InputError
 from rig_identification.model import sensors
-from rig_identification.nodes.sensor_node import Device, SensorNode, noise_names
+from rig_identification.nodes.sensor_node import Device, MountError, SensorNode, noise_names
 from rig_identification.rig import Rig
 
 
@@ -21,8 +21,10 @@ def device(rig: Rig) -> Device:
         )
     orientation = Rotation.from_quat(mount.orientation).as_matrix()
 
-    def read(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        return sensors.imu(rows, mount.position, orientation, np.zeros(sensors.IMU_SIZE)).values
+    def read(rows: NDArray[np.float64], error: MountError) -> NDArray[np.float64]:
+        own = np.zeros(sensors.IMU_SIZE)
+        own[0:3], own[3:6] = error.position, error.rotation
+        return sensors.imu(rows, mount.position, orientation, own).values
 
     noise = noise_names(("angular_rate", 3), ("specific_force", 3))
     return Device("imu", 6, (("imu/data_raw", slice(0, 6)),), noise, read)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.errors import InputError
 from rig_identification.model import sensors
-from rig_identification.nodes.sensor_node import Device, SensorNode, noise_names
+from rig_identification.nodes.sensor_node import Device, MountError, SensorNode, noise_names
 from rig_identification.rig import Rig
 
 
@@ -21,8 +21,8 @@ def device(rig: Rig) -> Device:
         )
     orientation = Rotation.from_quat(mount.orientation).as_matrix()
 
-    def read(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        return sensors.inclinometer(rows, orientation, np.zeros(sensors.INCLINOMETER_SIZE)).values
+    def read(rows: NDArray[np.float64], error: MountError) -> NDArray[np.float64]:
+        return sensors.inclinometer(rows, orientation, np.concatenate([error.rotation, np.zeros(2)])).values
 
     return Device(
         "inclinometer", 2, (("inclinometer/angles", slice(0, 2)),), noise_names(("inclination", 2)), read

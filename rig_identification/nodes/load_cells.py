@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.model import layout
-from rig_identification.nodes.sensor_node import Device, SensorNode, columns_of, noise_names
+from rig_identification.nodes.sensor_node import Device, MountError, SensorNode, columns_of, noise_names
 from rig_identification.rig import Rig
 
 
@@ -18,11 +18,14 @@ def device(rig: Rig) -> Device:
     topics = [f"{name}/wrench" for name in cables] + (["exciter/wrench"] if exciter else [])
     slices = columns_of([1] * n + ([3] if exciter else []))
 
-    def read(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def read(rows: NDArray[np.float64], error: MountError) -> NDArray[np.float64]:
+        _ = error  # cells sit in the cables
         return rows[:, layout.OUT_TENSION : layout.OUT_TENSION + n + exciter]
 
     noise = noise_names(("tension", n), ("exciter_force", exciter))
-    return Device("load_cells", n + exciter, tuple(zip(topics, slices, strict=True)), noise, read)
+    return Device(
+        "load_cells", n + exciter, tuple(zip(topics, slices, strict=True)), noise, read, mounted=False
+    )
 
 
 def create() -> SensorNode:

@@ -36,6 +36,15 @@ PARAMETERS = (
     OwnParameter("simulation.bias", [0.0], "constant error of each channel, SI; one number stands for all"),
     OwnParameter("simulation.gain", [0.0], "error of each channel's scale: 0.01 reads 1 % high"),
     OwnParameter(
+        "simulation.position_error", [0.0, 0.0, 0.0], "m that the device sits off its description, body axes"
+    ),
+    OwnParameter(
+        "simulation.rotation_error", [0.0, 0.0, 0.0], "rad, rotation vector of its frame, body axes"
+    ),
+    OwnParameter(
+        "simulation.time_constant", 0.0, "s of a first-order low-pass in the device", within(0.0, 10.0, "s")
+    ),
+    OwnParameter(
         "simulation.clock_offset", 0.0, "s that the device's stamps are late", within(-60.0, 60.0, "s")
     ),
     OwnParameter("simulation.seed", 0, "seed of the noise", within(0, 2**31)),
@@ -56,6 +65,14 @@ PARAMETERS = (
 
 
 @dataclass(frozen=True)
+class MountError:
+    """How a simulated device truly sits, against its description."""
+
+    position: Array  # (3,) m, body axes
+    rotation: Array  # (3,) rotation vector, rad, body axes
+
+
+@dataclass(frozen=True)
 class Device:
     """What a sensor node has to know of its device."""
 
@@ -63,7 +80,8 @@ class Device:
     width: int  # columns of a sample
     topics: tuple[tuple[str, slice], ...]  # contract name of each topic, its columns of the sample
     noise: tuple[str, ...]  # (width) key of Rig.noise for each column
-    read: Callable[[Array], Array]  # rows of the plant to true samples
+    read: Callable[[Array, MountError], Array]  # rows of the plant to true samples
+    mounted: bool = True  # it has a place and a direction on the body, which may be wrong
 
 
 class SensorNode(RigNode):
@@ -107,10 +125,21 @@ class SensorNode(RigNode):
             self.own.vector("simulation.bias", width),
             self.own.vector("simulation.gain", width),
             self.own.number("simulation.clock_offset"),
+            self.own.number("simulation.time_constant"),
         )
         # Two devices with one seed must not make the same noise
         rng = np.random.default_rng([self.own.whole("simulation.seed"), *self.get_name().encode()])
-        source = SimulatedSource(self.own.number("simulation.rate"), self.device.read, errors, rng)
+        mount = MountError(
+            self.own.vector("simulation.position_error", 3), self.own.vector("simulation.rotation_error", 3)
+        )
+        if not self.device.mounted and (np.any(mount.position) or np.any(mount.rotation)):
+            raise InputError(
+                f"parameter simulation.position_error: {self.device.node} has no mount on the body"
+            )
+        read = self.device.read
+        source = SimulatedSource(
+            self.own.number("simulation.rate"), lambda rows: read(rows, mount), errors, rng
+        )
 
         def hear(message: Float64MultiArray) -> None:
             source.add(from_message(message))

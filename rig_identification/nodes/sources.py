@@ -44,6 +44,7 @@ class DeviceErrors:
     bias: Array  # (w,)
     gain: Array  # (w,) error of the scale, 0.01 reads 1 % high
     clock_offset: float  # s, positive: stamps are late
+    time_constant: float = 0.0  # s, first-order low-pass
 
 
 class SimulatedSource(Source):
@@ -54,6 +55,8 @@ class SimulatedSource(Source):
     ) -> None:
         self._sampler, self._read, self._errors, self._rng = DeviceSampler(rate), read, errors, rng
         self._blocks: list[PlantBlock] = []
+        self._rate = rate
+        self._held: Array | None = None
         self._heard = time.monotonic()
 
     def add(self, block: PlantBlock) -> None:
@@ -71,9 +74,21 @@ class SimulatedSource(Source):
             return np.zeros(0, np.int64), np.zeros((0, self._errors.noise.size))
         times = np.concatenate([t for t, _ in sampled])
         true = self._read(np.concatenate([rows for _, rows in sampled]))
+        true = self._lag(true)
         noise = self._errors.noise * self._rng.standard_normal(true.shape)
         values = (1.0 + self._errors.gain) * true + self._errors.bias + noise
         return times + round(1e9 * self._errors.clock_offset), np.asarray(values)
+
+    def _lag(self, true: Array) -> Array:
+        """The device's low-pass, exact for a reading that is held between samples."""
+        if self._errors.time_constant <= 0.0:
+            return true
+        share = 1.0 - np.exp(-1.0 / (self._rate * self._errors.time_constant))
+        out = np.empty_like(true)
+        for k, reading in enumerate(true):
+            self._held = reading if self._held is None else self._held + share * (reading - self._held)
+            out[k] = self._held
+        return out
 
     def complaint(self) -> str:
         """The plant stands still."""
