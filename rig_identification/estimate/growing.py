@@ -59,12 +59,17 @@ def solve_growing(
         part = problem
         if not whole:
             # A short horizon must not throw away what the guess knows: the body stays near it
-            part = replace(shortened(problem, end), weak_center=guess, weak=HOLD * problem.weak)
+            part = replace(
+                shortened(problem, end),
+                weak_center=guess,
+                weak=HOLD * problem.weak,
+                stride=problem.stride / HOLD,
+            )
         # A short horizon needs no polish: the next one moves everything again
         evaluation, converged = solve(
             part,
             point,
-            iterations=15 if whole else 8,
+            iterations=40 if whole else 12,
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else _at(notify, end, duration),
         )

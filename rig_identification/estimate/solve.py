@@ -36,6 +36,10 @@ from rig_identification.model.motion import State, on_cables
 Array = NDArray[np.float64]
 
 
+#: No entry of the log-Cholesky vector moves further in one step, in units of its weak prior's std.
+LONGEST_STEP = 0.5
+
+
 @dataclass(frozen=True)
 class Problem:
     """What is fitted to what."""
@@ -47,6 +51,7 @@ class Problem:
     weak: Array  # (10,) std of a weak prior on the log-Cholesky vector about ``weak_center``
     weak_center: Array  # (10,)
     bound: float = np.inf  # free parameters stay within so many of their prior std
+    stride: float = LONGEST_STEP  # longest step of the body, in std of the weak prior
     extra_noise: Array | None = None  # (6, 6) random wrench over a node interval: what the model lacks
 
 
@@ -162,15 +167,34 @@ def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
 def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Array:
     """Damped Gauss-Newton step that keeps the free parameters within their bound.
 
+    The body moves by no more than the problem's stride; everything else then takes the step
+    that is best with the body where it got to.
+    """
+    information = current.information + damping * np.diag(np.diag(current.information))
+    change = np.zeros(information.shape[0])
+    fixed = np.zeros(information.shape[0], dtype=bool)
+    change = _step_within_bounds(problem, current, information, change, fixed)
+    longest = float(np.max(np.abs(change[:INERTIAL]) / problem.weak))
+    if longest <= problem.stride:
+        return change
+    shortened = np.zeros_like(change)
+    shortened[:INERTIAL] = change[:INERTIAL] * problem.stride / longest
+    fixed[:INERTIAL] = True
+    return _step_within_bounds(problem, current, information, shortened, fixed)
+
+
+def _step_within_bounds(
+    problem: Problem, current: Evaluation, information: Array, change: Array, fixed: NDArray[np.bool_]
+) -> Array:
+    """Newton step of all that is not ``fixed``, which makes the ``change`` given.
+
     Active set: a parameter that the step would carry past its bound goes onto it, and the
     others are solved for again with that move made (Nocedal & Wright, "Numerical
-    Optimization", section 16.7). The body moves by no more than LONGEST_STEP.
+    Optimization", section 16.7).
     """
     p = problem.bench.parameters.size
-    information = current.information + damping * np.diag(np.diag(current.information))
-    fixed = np.zeros(information.shape[0], dtype=bool)
-    change = np.zeros(information.shape[0])
     theta = current.point.theta
+    change, fixed = change.copy(), fixed.copy()
     for _ in range(20):
         open_ = np.flatnonzero(~fixed)
         held = np.flatnonzero(fixed)
@@ -184,12 +208,7 @@ def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Arra
         beyond = np.flatnonzero(reached)
         change[beyond] = np.sign(theta[beyond] + change[beyond]) * problem.bound - theta[beyond]
         fixed |= reached
-    longest = float(np.max(np.abs(change[:INERTIAL]) / problem.weak))
-    return change * min(1.0, LONGEST_STEP / max(longest, 1e-300))
-
-
-#: No entry of the log-Cholesky vector moves further in one step, in units of its weak prior's std.
-LONGEST_STEP = 0.5
+    return change
 
 
 def solve(
