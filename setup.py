@@ -71,8 +71,8 @@ setup(
             f"ros-jazzy-common-interfaces{ROS_WHEELS}",
             "pyserial>=3.5",
         ],
-        "test": ["hypothesis>=6.90", "pytest>=8.0", "ruff>=0.9"],
-        "dev": ["mujoco>=3.1", "mypy>=1.10", "ruff>=0.9"],
+        "test": ["hypothesis>=6.90", "pytest>=8.0", "pytest-xdist>=3.6", "ruff>=0.17,<0.18"],
+        "dev": ["mujoco>=3.1", "mypy>=1.10"],
     },
     entry_points={"console_scripts": ["rig-identification = rig_identification.cli.main:main", *NODES]},
 )

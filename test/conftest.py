@@ -18,6 +18,22 @@ from rig_identification.rig import Cable, CarryingFrame, Mount, Rig
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 
+#: Files of long tests that share no fixture: any worker may take any of them.
+FREELY_SPREAD = {"test_estimate_fit", "test_model_agreement", "test_model_conservation"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep together, in one of several workers, what shares a slow fixture, and all live nodes.
+
+    Nodes talk in real time: two graphs at once on a small machine would starve each other.
+    """
+    for item in items:
+        name = item.path.stem
+        if name.startswith("test_nodes"):
+            item.add_marker(pytest.mark.xdist_group("nodes"))
+        elif name not in FREELY_SPREAD:
+            item.add_marker(pytest.mark.xdist_group(name))
+
 
 @pytest.fixture
 def rig() -> Rig:
