@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig_identification.errors import InputError
 from rig_identification.live.body_tracker import BodyTracker
 from rig_identification.live.common_time import CommonTime
 from rig_identification.live.generalized_wrench import generalized_wrench
@@ -17,7 +21,11 @@ from rig_identification.live.stamp_gate import RESTART, SECOND, StampGate
 from rig_identification.model import layout, sensors
 from rig_identification.model.body import tensor
 from rig_identification.model.motion import rig_model
+from rig_identification.nodes.session_folder import DiskFull, RecordingPlan, SessionFolder
 from rig_identification.rig import Cable, Mount, Rig
+from rig_identification.session import read_session
+from rig_identification.session.messages import serialize
+from rig_identification.session.topics import Topic, expected_topics
 
 START = 1_790_000_000 * SECOND
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
@@ -98,6 +106,56 @@ def test_the_gate_follows_a_device_that_was_restarted_with_another_clock() -> No
     assert gate.restarts == 1
     assert admitted[RESTART:].all()
     assert not admitted[: RESTART - 1].any()
+
+
+def messages(topic: Topic, count: int, first: int = 0) -> tuple[list[bytes], list[int]]:
+    stamps = START + SECOND // 100 * np.arange(first, first + count)
+    rows = serialize(topic, stamps, np.random.default_rng(first).standard_normal((count, 1)) + 2400.0)
+    return [row.tobytes() for row in rows], stamps.tolist()
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_recording_ends_in_good_order_before_the_disk_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, storage: str
+) -> None:
+    rig = make_rig()
+    topics = expected_topics(tuple(cable.name for cable in rig.cables))
+    topic = topics["/rig/cable_1/wrench"]
+    folder = SessionFolder(tmp_path / "session", rig, topics, storage)
+    folder.start(RecordingPlan("run_1", "dynamic"))
+    folder.add(topic.name, *messages(topic, 500))
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage._replace(free=1_000_000))
+    with pytest.raises(DiskFull, match=r"recording run_1 ended: .* MiB are left"):
+        folder.add(topic.name, *messages(topic, 500, first=500))
+    assert folder.plan is None
+    monkeypatch.undo()
+    folder.add(topic.name, *messages(topic, 10, first=1000))  # nothing is open: nothing happens
+    (run,) = read_session(tmp_path / "session").recordings
+    assert len(run.tension["cable_1"].time) == 500
+    with pytest.raises(InputError, match=r"run_1: is in .* already"):
+        folder.start(RecordingPlan("run_1", "dynamic"))
+
+
+def test_a_window_without_a_message_leaves_nothing(tmp_path: Path) -> None:
+    rig = make_rig()
+    folder = SessionFolder(tmp_path / "session", rig, expected_topics(("cable_1",)), "mcap")
+    folder.start(RecordingPlan("run_1", "dynamic"))
+    assert folder.stop() is None
+    assert list((tmp_path / "session").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "holdout", "words"),
+    [
+        ("../elsewhere", "dynamic", False, "no folder's name"),
+        ("run_1", "dynmic", False, "is unknown; give static or dynamic"),
+        ("rest", "static", True, "cannot be held out"),
+    ],
+)
+def test_a_plan_that_makes_no_sense_is_refused(name: str, kind: str, holdout: bool, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        RecordingPlan(name, kind, holdout)
 
 
 def test_half_a_line_is_no_smaller_number() -> None:

@@ -26,7 +26,7 @@ PARAMETERS = (
     ),
     OwnParameter("include_weight", True, "gravity is part of the force"),
     OwnParameter("period", 0.01, "s between looks at what arrived", within(0.001, 0.5, "s")),
-    OwnParameter("depth", 1000, "messages kept of each topic: a second of the fastest", within(10, 100_000)),
+    OwnParameter("depth", 2000, "messages kept of each topic: seconds of the fastest", within(10, 100_000)),
 )
 _POSE, _EXCITER = "pose", "exciter"
 

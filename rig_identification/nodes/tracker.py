@@ -21,9 +21,12 @@ from rig_identification.session.topics import expected_topics
 PARAMETERS = (
     OwnParameter("integrate_only", False, "plain integration of the IMU from rest: nothing holds it"),
     OwnParameter("period", 0.004, "s between looks at what arrived", within(0.001, 0.1, "s")),
-    OwnParameter("depth", 1000, "messages kept of each topic: a second of the fastest", within(10, 100_000)),
+    OwnParameter("depth", 2000, "messages kept of each topic: seconds of the fastest", within(10, 100_000)),
     OwnParameter("marker_rate", 10.0, "Hz of the markers; 0: none", within(0.0, 60.0, "Hz")),
 )
+#: Forces change the track slowly: they are looked at once in so many times.
+FORCES_EVERY = 5
+_PROMPT = ("imu", "inclination")
 _USED = ("tension", "exciter_force", "imu", "inclination")
 
 
@@ -39,6 +42,8 @@ class TrackerNode(RigNode):
         used = {name: topic for name, topic in topics.items() if topic.channel in _USED}
         depth = self.own.whole("depth")
         self.intake = Intake(self, used, depth)
+        self._prompt = [name for name, topic in used.items() if topic.channel in _PROMPT]
+        self._looks = 0
         self._writer = OdometryWriter()
         self._odometry = self.create_publisher(Odometry, "odometry", reliable(depth))
         self._markers = self.create_publisher(MarkerArray, "markers", 10)
@@ -52,7 +57,8 @@ class TrackerNode(RigNode):
 
     def _work(self) -> None:
         imu = None
-        for batch in self.intake.take():
+        self._looks += 1
+        for batch in self.intake.take(None if self._looks % FORCES_EVERY == 0 else self._prompt):
             channel = batch.topic.channel
             if channel == "imu":
                 imu = batch
