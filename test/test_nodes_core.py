@@ -16,6 +16,7 @@ from rig_identification.live.generalized_wrench import generalized_wrench
 from rig_identification.live.number_lines import LineBuffer, LineFormat
 from rig_identification.live.plant import Plant, Shaking, odometry_values
 from rig_identification.live.plant_blocks import DeviceSampler, PlantBlock
+from rig_identification.live.plant_effects import PlantEffects, with_effects
 from rig_identification.live.running_inertia import RunningInertia
 from rig_identification.live.stamp_gate import RESTART, SECOND, StampGate
 from rig_identification.model import layout, sensors
@@ -73,6 +74,32 @@ def imu_readings(rig: Rig, rows: np.ndarray, rng: np.random.Generator) -> np.nda
     R = Rotation.from_quat(rig.imu.orientation).as_matrix()
     true = sensors.imu(rows, rig.imu.position, R, np.zeros(sensors.IMU_SIZE)).values
     return true + rng.standard_normal(true.shape) * ([0.0003] * 3 + [0.01] * 3)
+
+
+def energy_left(effects: PlantEffects) -> float:
+    """Share of a swing's amplitude that 10 s of free motion leave."""
+    plant = Plant(with_effects(rig_model(make_rig(), BODY), effects), START)
+    plant.shake(Shaking(np.array([150.0, 120.0, 60.0]), np.array([0.42, 0.71, 1.1])))
+    plant.advance(5.0)
+    plant.stop_shaking()
+    first, _ = plant.advance(5.0)
+    plant.advance(10.0)
+    last, _ = plant.advance(5.0)
+    return float(np.std(last.rows[:, sensors.RATE]) / np.std(first.rows[:, sensors.RATE]))
+
+
+def test_an_effect_that_is_switched_on_shows_in_the_plants_motion() -> None:
+    free = energy_left(PlantEffects())
+    assert 0.9 < free < 1.1
+    assert energy_left(PlantEffects(hinge_damping=50.0)) < 0.9 * free
+    rig = make_rig()
+    ideal, tilted = (
+        Plant(with_effects(rig_model(rig, BODY), effects), START)
+        for effects in (PlantEffects(), PlantEffects(level_error=np.array([0.0, 0.01])))
+    )
+    down = [plant.advance(0.01)[0].rows[0, sensors.GRAVITY] for plant in (ideal, tilted)]
+    assert np.linalg.norm(down[0]) == pytest.approx(np.linalg.norm(down[1]), rel=1e-12)
+    assert np.linalg.norm(ideal.state.position - tilted.state.position) > 3e-4
 
 
 def test_the_gate_counts_every_oddity_by_its_name() -> None:

@@ -12,7 +12,7 @@ from std_msgs.msg import Float64MultiArray
 
 from rig_identification.errors import InputError
 from rig_identification.live.plant import Plant, Shaking, odometry_values
-from rig_identification.model import layout
+from rig_identification.live.plant_effects import PlantEffects, with_effects
 from rig_identification.model.body import can_exist
 from rig_identification.model.motion import Motion, RigModel, rig_model
 from rig_identification.nodes.parameters import OwnParameter, within
@@ -22,6 +22,27 @@ from rig_identification.recording import Dummy
 from rig_identification.session.messages import serialize
 from rig_identification.session.topics import expected_topics
 
+#: Effects that the plant can have; those of the devices are the sensor nodes' own parameters.
+EFFECTS = (
+    OwnParameter(
+        "effect.cable_elasticity", 0.0, "EA of the cables, N; 0: inextensible", within(0.0, 1e12, "N")
+    ),
+    OwnParameter("effect.cable_length", [0.0], "m that cables are longer than described, each or all"),
+    OwnParameter("effect.cable_mass", 0.0, "kg/m of the cables", within(0.0, 1e3, "kg/m")),
+    OwnParameter("effect.hinge_damping", 0.0, "N m s/rad of each hinge", within(0.0, 1e6)),
+    OwnParameter("effect.hinge_friction", 0.0, "N m of each hinge", within(0.0, 1e6)),
+    OwnParameter("effect.air_drag", 0.0, "Cd A, m^2", within(0.0, 1e4, "m^2")),
+    OwnParameter("effect.air_added_mass", 0.0, "kg of entrained air", within(0.0, 1e4, "kg")),
+    OwnParameter("effect.exciter_rotor", 0.0, "kg that the exciter moves", within(0.0, 1e4, "kg")),
+    OwnParameter(
+        "effect.exciter_gain", 0.0, "0.01: the true force is 1 % above the measured", within(-0.5, 0.5)
+    ),
+    OwnParameter(
+        "effect.level_error", [0.0, 0.0], "rad, ceiling tilted about world x and y", within(-0.5, 0.5)
+    ),
+    OwnParameter("effect.tether", [0.0, 0.0, 0.0], "N/m along world axes, slack at rest", within(0.0, 1e9)),
+    OwnParameter("effect.tether_point", [0.0, 0.0, 0.0], "m, body frame", within(-100.0, 100.0, "m")),
+)
 PARAMETERS = (
     OwnParameter("speed", 1.0, "simulated seconds a second", within(0.01, 100.0)),
     OwnParameter(
@@ -46,13 +67,16 @@ PARAMETERS = (
     OwnParameter(
         "dummy.position", [0.0, 0.0, 0.0], "m, body frame", within(-100.0, 100.0, "m"), settable=True
     ),
-    OwnParameter(
-        "plant.axial_stiffness", 0.0, "EA of the cables, N; 0: inextensible", within(0.0, 1e12, "N")
-    ),
-    OwnParameter("plant.cable_length_error", [0.0], "m that cables are longer than described, each or all"),
-    OwnParameter(
-        "plant.exciter_gain", 0.0, "0.01: the true force is 1 % above the measured", within(-0.5, 0.5)
-    ),
+    *EFFECTS,
+)
+_NUMBERS = (
+    "cable_mass",
+    "hinge_damping",
+    "hinge_friction",
+    "air_drag",
+    "air_added_mass",
+    "exciter_rotor",
+    "exciter_gain",
 )
 #: Wall seconds between two blocks.
 TICK = 0.01
@@ -98,13 +122,16 @@ class RigSimulator(RigNode):
             raise InputError(
                 f"parameter body.inertia: no body has {inertia.tolist()} kg m^2; order is xx xy xz yy yz zz"
             )
-        stiffness = self.own.number("plant.axial_stiffness")
+        stiffness = self.own.number("effect.cable_elasticity")
         model = rig_model(rig, elements, axial_stiffness=stiffness or None)
-        physics = model.physics.copy()
-        physics[layout.EXCITER_GAIN] = 1.0 + self.own.number("plant.exciter_gain")
-        for i, error in enumerate(self.own.vector("plant.cable_length_error", len(rig.cables))):
-            physics[layout.cable_offset(i) + layout.LENGTH] += error
-        return model.with_physics(physics)
+        effects = PlantEffects(
+            **{name: self.own.number(f"effect.{name}") for name in _NUMBERS},
+            tether=self.own.vector("effect.tether", 3),
+            tether_point=self.own.vector("effect.tether_point", 3),
+            cable_length=self.own.vector("effect.cable_length", len(rig.cables)),
+            level_error=self.own.vector("effect.level_error", 2),
+        )
+        return with_effects(model, effects)
 
     def _shaking(self) -> Shaking:
         return Shaking(self.own.vector("shake.amplitude", 3), self.own.vector("shake.frequency", 3))
