@@ -28,8 +28,9 @@ from rig_identification.model.body import (
     log_cholesky_from_linear,
 )
 from rig_identification.model.motion import Input, simulate
-from rig_identification.result import ELEMENTS
-from rig_identification.simulate import Pulled, simulate_session
+from rig_identification.recording import Session
+from rig_identification.result import ELEMENTS, InertialEstimate
+from rig_identification.simulate import Pulled, Truth, simulate_session
 from rig_identification.simulate.start import rest_state
 
 Array = NDArray[np.float64]
@@ -123,17 +124,25 @@ def test_fit_from_no_guess_holds_the_truth(cables: int) -> None:
     assert np.max(np.abs(estimate.values - truth.elements)[seen] / std[seen]) < 4.0
 
 
+def at_the_truth(session: Session, truth: Truth) -> InertialEstimate:
+    """What the recordings can tell, apart from how it is found."""
+    problem, _, _ = pose_problem(session)
+    theta = vector_of(problem, truth)
+    rest = rest_state(model_at(problem.bench.parameters, theta))
+    evaluation = evaluate(problem, Point(theta, (truth.starts["run_1"],), (rest,) * len(problem.rests)))
+    assert evaluation is not None
+    return inertial_estimate(problem, evaluation)
+
+
 def test_four_parallel_cables_hide_what_only_tilting_shows() -> None:
-    # As described: half a millimetre of length that four stiff parallel cables do not share slackens one
+    # As described: half a millimetre of length that four stiff parallel cables do not share slackens one.
+    # Without load cells: how inextensible cables share the load, when three would do, is undefined.
     session, truth = recorded(four_parallel(), seed=1, duration=6.0, doubts=False)
-    fitted = fit_session(session)
-    estimate = inertial_estimate(fitted.problem, fitted.evaluation)
+    cells = tuple(replace(recording, tension={}) for recording in session.recordings)
+    session = replace(session, recordings=cells)
+    estimate = at_the_truth(session, truth)
     assert {"Jxx", "Jyy", "Jxy"} <= set(estimate.unobservable)
-    assert "Jzz" not in estimate.unobservable
-    assert "m" not in estimate.unobservable
-    jzz = ELEMENTS.index("Jzz")
-    std = np.sqrt(estimate.covariance[jzz, jzz])
-    assert abs(estimate.values[jzz] - truth.elements[jzz]) < 4.0 * std
+    assert not {"Jzz", "m", "cx", "cy"} & set(estimate.unobservable)
 
 
 def test_a_gentle_bifilar_pendulum_hides_rolling_about_its_span() -> None:
@@ -143,13 +152,7 @@ def test_a_gentle_bifilar_pendulum_hides_rolling_about_its_span() -> None:
     assert isinstance(run.start, Pulled)
     gentle = replace(run, start=Pulled(0.1 * run.start.force, run.start.point), force=None)
     session, truth = simulate_session(replace(spec, runs=(gentle,)), np.random.default_rng(3))
-    problem, _, _ = pose_problem(session)
-    theta = vector_of(problem, truth)
-    rest = rest_state(model_at(problem.bench.parameters, theta))
-    # At the truth: what the recordings can tell, apart from how it is found
-    evaluation = evaluate(problem, Point(theta, (truth.starts["run_1"],), (rest,) * len(problem.rests)))
-    assert evaluation is not None
-    assert inertial_estimate(problem, evaluation).unobservable == ("Jyy",)
+    assert at_the_truth(session, truth).unobservable == ("Jyy",)
 
 
 def test_a_bifilar_pendulum_is_fitted_from_no_guess() -> None:

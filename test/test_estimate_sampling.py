@@ -12,6 +12,7 @@ from rig_identification.estimate.sampling import (
     Grid,
     group_by_node,
     interpolation,
+    jumps_of,
     node_values,
     rate_of_change,
     sample_noise_std,
@@ -108,3 +109,22 @@ def test_noise_is_told_from_motion(std: float) -> None:
     motion = 500.0 * std * np.sin(2.0 * np.pi * 0.7 * time)
     found = sample_noise_std(time, (motion + std * rng.normal(size=time.size))[:, None])
     assert found[0] == pytest.approx(std, rel=0.06)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 3.0, 12.0])
+def test_a_swing_has_no_jumps(frequency: float) -> None:
+    rng = np.random.default_rng(4)
+    grid = Grid(0.005, 1001)
+    time = np.arange(0.0, grid.duration, 0.0025)
+    swing = 800.0 * np.sin(2.0 * np.pi * frequency * time) + rng.normal(0.0, 0.5, time.size)
+    assert not np.any(jumps_of(node_values(grid, time, swing[:, None]), 0.5))
+
+
+def test_a_step_is_found_and_where() -> None:
+    rng = np.random.default_rng(4)
+    grid = Grid(0.005, 1001)
+    time = np.arange(0.0, grid.duration, 0.0025)
+    force = 800.0 * np.sin(np.pi * time) + 300.0 * (time > 2.5012) + rng.normal(0.0, 0.5, time.size)
+    jumps = jumps_of(node_values(grid, time, force[:, None]), 0.5)
+    assert np.all(np.abs(grid.step * np.flatnonzero(jumps) - 2.5) <= 3.0 * grid.step)
+    assert np.sum(jumps) == pytest.approx(300.0, rel=0.15)

@@ -118,7 +118,7 @@ def test_every_physics_entry_of_rigid_rigs(seed: int, cables: int) -> None:
     idle = (layout.AXIAL_STIFFNESS, layout.AXIAL_DAMPING)
     entries = [
         e
-        for e in range(model.physics.size)
+        for e in range(layout.effects_offset(cables))
         if e < layout.CABLES or (e - layout.CABLES) % layout.CABLE_SIZE not in idle
     ]
     check_physics(model, moving(sample, model, seed), drive_of(61, 0.01, seed), entries, 5e-7)
@@ -133,7 +133,7 @@ def test_every_physics_entry_of_elastic_rigs(seed: int, cables: int) -> None:
     for i in range(cables):
         physics[layout.cable_offset(i) + layout.AXIAL_DAMPING] = 2e-3
     model = model.with_physics(physics)
-    entries = list(range(model.physics.size))
+    entries = list(range(layout.effects_offset(cables)))
     check_physics(model, moving(sample, model, seed), drive_of(41, 0.01, seed), entries, 1e-6)
 
 
@@ -258,7 +258,7 @@ def test_where_a_start_follows_the_cables() -> None:
 )
 def test_rest_in_every_physics_entry(sample: Sample, axial_stiffness: float | None) -> None:
     model = sample.model(axial_stiffness=axial_stiffness, rods=True)
-    entries = np.arange(model.physics.size)
+    entries = np.arange(layout.effects_offset(model.cables))
     near = settle(sample.model(rods=True), sample.start)
     rest = find_rest(model, near, directions=entries)
     assert rest.converged

@@ -129,16 +129,21 @@ def moving(sample: Sample, model: RigModel, seed: int) -> State:
     return on_cables(model, state)
 
 
+def cable_blocks(model: RigModel) -> Array:
+    """(n, CABLE_SIZE) entries of each cable."""
+    return model.physics[layout.CABLES : layout.effects_offset(model.cables)].reshape(-1, layout.CABLE_SIZE)
+
+
 def cable_lengths(model: RigModel, position: Array, R: Array) -> Array:
     """(N, n) m of poses (N, 3), (N, 3, 3), by the law of Pythagoras alone."""
-    blocks = model.physics[layout.CABLES :].reshape(-1, layout.CABLE_SIZE)
+    blocks = cable_blocks(model)
     hinges = position[:, None, :] + np.einsum("nij,cj->nci", R, blocks[:, 3:6])
     return np.asarray(np.linalg.norm(hinges - blocks[:, 0:3], axis=2))
 
 
 def unloaded_lengths(model: RigModel) -> Array:
     """(n,) m."""
-    return np.asarray(model.physics[layout.CABLES :].reshape(-1, layout.CABLE_SIZE)[:, layout.LENGTH])
+    return np.asarray(cable_blocks(model)[:, layout.LENGTH])
 
 
 @pytest.mark.parametrize("cables", [2, 3, 4, 5, 6])

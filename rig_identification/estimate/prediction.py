@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
-from rig_identification.estimate.sampling import interpolation, node_values, rate_of_change
+from rig_identification.estimate.sampling import interpolation, jumps_of, node_values, rate_of_change
 from rig_identification.estimate.whitening import smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
@@ -132,14 +132,20 @@ def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:
 
 
 def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
-    """(N, 6, 6) covariance of the wrench held over each node interval that the exciter's noise stands for."""
+    """(N, 6, 6) covariance of the wrench held over each node interval that the force's error stands for.
+
+    Two errors: the samples' noise, and the moment of a jump, which lies anywhere between two nodes.
+    """
     out = np.zeros((run.grid.nodes, 6, 6))
     if run.exciter is None or run.exciter_noise == 0.0:
         return out
     spread = exciter_wrench_map(parameters, theta)
     held = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
     out[:] = held * spread @ spread.T
-    return out
+    force = node_values(run.grid, run.exciter.time, run.exciter.values)
+    jumps = spread @ jumps_of(force, run.exciter_noise)[:, :, None]
+    # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12
+    return np.asarray(out + jumps @ jumps.transpose(0, 2, 1) / 12.0)
 
 
 def _channel_rows(

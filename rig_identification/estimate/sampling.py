@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.signal import savgol_coeffs, savgol_filter
 from scipy.sparse import csr_matrix
 
@@ -96,6 +96,23 @@ def node_values(grid: Grid, time: Array, values: Array) -> Array:
         axis=1,
     )
     return np.asarray(solveh_banded(bands, right, lower=True))
+
+
+#: A change between two nodes is a jump where it differs from its neighbours' by so many standard
+#: deviations of noise, and by so many times their size.
+JUMP_IN_NOISE, JUMP_IN_CHANGE = 8.0, 3.0
+
+
+def jumps_of(nodes: Array, noise: float) -> Array:
+    """(nodes, w) what an input does between two nodes and not beside them; zero where it is smooth.
+
+    noise: standard deviation of one node's value, roughly.
+    """
+    change = np.diff(nodes, axis=0, append=nodes[-1:])
+    excess = change - median_filter(change, size=(5, 1), mode="nearest")
+    beside = median_filter(np.abs(change), size=(5, 1), mode="nearest")
+    least = np.maximum(JUMP_IN_NOISE * np.sqrt(2.0) * noise, JUMP_IN_CHANGE * beside)
+    return np.where(np.abs(excess) > least, excess, 0.0)
 
 
 def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
