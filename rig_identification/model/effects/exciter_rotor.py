@@ -1,4 +1,4 @@
-"""The exciter's moving mass: it rides on the body at the exciter's origin, unweighed and unfelt by its force cells."""
+"""The exciter's moving mass: it rides on the body at the exciter's origin, unfelt by its force cells."""
 
 from __future__ import annotations
 
