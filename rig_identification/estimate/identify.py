@@ -26,7 +26,7 @@ from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import State, rig_model
 from rig_identification.recording import Session
-from rig_identification.result import Identification, ParameterEstimate
+from rig_identification.result import ChannelFit, Identification, Mismatch, ParameterEstimate
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -182,51 +182,95 @@ def parameter_estimates(problem: Problem, evaluation: Evaluation) -> tuple[Param
     return tuple(out)
 
 
+@dataclass(frozen=True)
+class Scores:
+    """Every sample beside its prediction, and the two errors that a person asks for first."""
+
+    channels: tuple[ChannelFit, ...]
+    training: float
+    holdout: float | None
+
+
+def scores(fitted: Fitted) -> Scores:
+    """Predictions and errors of a fit."""
+    problem, evaluation = fitted.problem, fitted.evaluation
+    fits = []
+    for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
+        fits += run_fits(problem, run, linearised, evaluation.point.theta)
+    training = error_in_sigma(fits)
+    for evidence, rest in zip(problem.rests, evaluation.rests, strict=True):
+        fits += rest_fits(evidence, rest)
+    held = []
+    for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
+        held += run_fits(problem, run, linearised, evaluation.point.theta)
+    return Scores(tuple(fits + held), training, error_in_sigma(held) if held else None)
+
+
+@dataclass(frozen=True)
+class Ideal:
+    """The ideal model's fit, its verdict, and the cautious fit where it fails."""
+
+    fitted: Fitted
+    scores: Scores
+    mismatch: Mismatch
+    careful: tuple[Problem, Evaluation] | None
+
+
+#: What the report says of numbers that come from the cautious fit.
+CAUTION = (
+    "The model does not explain these recordings. The ten numbers come from a fit in short pieces that "
+    "weighs each channel by its own residual; their intervals hold what the model lacks only as far as "
+    "the residuals show it."
+)
+
+
+def fit_ideal(session: Session, notify: Progress) -> Ideal:
+    """Fit the ideal model, judge it, and fit cautiously where it fails."""
+    fitted = fit_session(session, notify)
+    found = scores(fitted)
+    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
+    mismatch = judge(fitted, parameters, found.holdout, found.training, ORDINARY)
+    careful = None
+    if mismatch.verdict == "unexplained" and fitted.problem.runs:
+        notify("fitting in short pieces, each channel weighed by its residual", 0.7)
+        point = fitted.evaluation.point
+        parts, evaluation, _ = solve_cautiously(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
+        careful = (parts, evaluation)
+    return Ideal(fitted, found, mismatch, careful)
+
+
+def compose(
+    session: Session,
+    fitted: Fitted,
+    found: Scores,
+    mismatch: Mismatch,
+    careful: tuple[Problem, Evaluation] | None,
+) -> Identification:
+    """Everything that a fit says of a session; the body from the cautious fit where there is one."""
+    total = inertial_estimate(*(careful or (fitted.problem, fitted.evaluation)))
+    frame = session.rig.frame
+    return Identification(
+        total=total,
+        without_frame=None if frame is None else subtract_frame(total, frame),
+        mismatch=mismatch,
+        parameters=parameter_estimates(fitted.problem, fitted.evaluation),
+        channels=found.channels,
+        holdout_error=found.holdout,
+        training_error=found.training,
+        converged=fitted.converged,
+        notes=fitted.notes + ((CAUTION,) if careful else ()),
+    )
+
+
 def identify(session: Session, progress: Progress | None = None) -> Identification:
     """Mass, centre of mass, inertia tensor and whether the ideal model explains the session.
 
     Raises InputError where the session holds nothing to fit.
     """
     notify = progress or _silent
-    fitted = fit_session(session, notify)
-    problem, evaluation = fitted.problem, fitted.evaluation
-    frame = session.rig.frame
-    fits = []
-    for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
-        fits += run_fits(problem, run, linearised, evaluation.point.theta)
-    training_error = error_in_sigma(fits)
-    for evidence, rest in zip(problem.rests, evaluation.rests, strict=True):
-        fits += rest_fits(evidence, rest)
-    held_fits = []
-    for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
-        held_fits += run_fits(problem, run, linearised, evaluation.point.theta)
-    holdout_error = error_in_sigma(held_fits) if held_fits else None
-    parameters = parameter_estimates(problem, evaluation)
-    mismatch = judge(fitted, parameters, holdout_error, training_error, ORDINARY)
-    total, notes = inertial_estimate(problem, evaluation), fitted.notes
-    if mismatch.verdict == "unexplained" and problem.runs:
-        notify("fitting in short pieces, each channel weighed by its residual", 0.75)
-        parts, careful, _ = solve_cautiously(
-            problem, evaluation.point.theta, fitted.rest, evaluation.point.rest_guesses
-        )
-        total = inertial_estimate(parts, careful)
-        notes += (
-            "The ideal model does not explain these recordings. The ten numbers come from a fit in short "
-            "pieces that weighs each channel by its own residual; their intervals hold what the model lacks "
-            "only as far as the residuals show it.",
-        )
+    ideal = fit_ideal(session, notify)
     notify("done", 1.0)
-    return Identification(
-        total=total,
-        without_frame=None if frame is None else subtract_frame(total, frame),
-        mismatch=mismatch,
-        parameters=parameters,
-        channels=tuple(fits + held_fits),
-        holdout_error=holdout_error,
-        training_error=training_error,
-        converged=fitted.converged,
-        notes=notes,
-    )
+    return compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
 
 
 def error_in_sigma(fits) -> float:  # type: ignore[no-untyped-def]

@@ -8,7 +8,7 @@ form (model/body.py), with no prior of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,7 @@ class Parameter:
     prior_std: float  # what the lab believes
     kind: str  # "physics": entry of the model's flat array; "device": entry of DeviceLayout's
     index: int
+    bounded: bool = True  # the ideal model keeps it within a few of its prior std
 
 
 @dataclass(frozen=True)
@@ -206,6 +207,25 @@ class ParameterSet:
     def size(self) -> int:
         """Length of the optimiser's vector without start states."""
         return INERTIAL + len(self.free)
+
+    def index_of(self, name: str) -> int:
+        """Column of a free parameter in the vector."""
+        return INERTIAL + next(i for i, p in enumerate(self.free) if p.name == name)
+
+    def having(self, others: tuple[Parameter, ...]) -> ParameterSet:
+        """The same set with ``others`` added, or put in place of those of the same name."""
+        new = {p.name: p for p in others}
+        kept = tuple(new.pop(p.name, p) for p in self.free)
+        return replace(self, free=kept + tuple(new.values()))
+
+    def converted(self, theta: Array, other: ParameterSet) -> Array:
+        """The vector in this set of what ``theta`` says in ``other``; what that set lacks is as described."""
+        told = dict(zip((p.name for p in other.free), other.values(theta), strict=True))
+        out = np.zeros(self.size)
+        out[:INERTIAL] = theta[:INERTIAL]
+        for i, p in enumerate(self.free, start=INERTIAL):
+            out[i] = (told.get(p.name, p.nominal) - p.nominal) / p.prior_std
+        return out
 
     def start(self, elements: Array) -> Array:
         """Vector of a body given by its ``elements``, everything else as described."""

@@ -194,6 +194,7 @@ def _step_within_bounds(
     """
     p = problem.bench.parameters.size
     theta = current.point.theta
+    limit = np.array([problem.bound if q.bounded else np.inf for q in problem.bench.parameters.free])
     change, fixed = change.copy(), fixed.copy()
     for _ in range(20):
         open_ = np.flatnonzero(~fixed)
@@ -202,7 +203,7 @@ def _step_within_bounds(
         change[open_] = np.linalg.solve(information[np.ix_(open_, open_)], right)
         reached = np.zeros_like(fixed)
         target = theta[INERTIAL:p] + change[INERTIAL:p]
-        reached[INERTIAL:p] = (np.abs(target) > problem.bound + 1e-9) & ~fixed[INERTIAL:p]
+        reached[INERTIAL:p] = (np.abs(target) > limit + 1e-9) & ~fixed[INERTIAL:p]
         if not np.any(reached):
             break
         beyond = np.flatnonzero(reached)

@@ -92,16 +92,17 @@ def imu(raw: Array, position: Array, orientation: Array, device: Array) -> Readi
     return Reading(values, in_raw, in_device)
 
 
-#: inclinometer: rotation error 3
-INCLINOMETER_SIZE = 3
+#: inclinometer: rotation error 3, zero error of x and y
+INCLINOMETER_SIZE = 5
 
 
 def inclinometer(raw: Array, orientation: Array, device: Array) -> Reading:
     """Angles (N, 2) of the inclinometer's x and y axis above the horizontal plane, rad.
 
-    orientation (3, 3): as described. device (3,): rotation vector against it, rad, body axes.
+    orientation (3, 3): as described. device (5,): rotation vector against it, rad, body axes, and
+    zero error of each axis, rad.
     """
-    turn = Rotation.from_rotvec(device).as_matrix() @ orientation
+    turn = Rotation.from_rotvec(device[:3]).as_matrix() @ orientation
     gravity = raw[:, GRAVITY]
     size = np.linalg.norm(gravity, axis=1, keepdims=True)
     up = -gravity / size
@@ -115,8 +116,10 @@ def inclinometer(raw: Array, orientation: Array, device: Array) -> Reading:
     )
     # d(axis) = d x axis: up . (d x axis) = d . (axis x up)
     turned = np.cross(turn[:, :2].T[None], up[:, None, :])
-    in_device = slope[:, :, None] * turned @ left_jacobian(device)
-    return Reading(np.arcsin(sine), in_raw, in_device)
+    in_device = np.zeros((nodes, 2, INCLINOMETER_SIZE))
+    in_device[:, :, :3] = slope[:, :, None] * turned @ left_jacobian(device[:3])
+    in_device[:, :, 3:] = np.eye(2)
+    return Reading(np.arcsin(sine) + device[3:5], in_raw, in_device)
 
 
 #: mocap: marker position 3 and rotation 3 in body, tracker position 3 and rotation 3 in world

@@ -1,0 +1,150 @@
+"""The session with what was left out in the model: fitted, judged on the held-out run, and told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig_identification.estimate.growing import fit_start_growing
+from rig_identification.estimate.identify import ORDINARY, Fitted, parameter_estimates, scores
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.segments import solve_in_pieces
+from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.verdict import judge
+from rig_identification.mismatch.screen import carried, extended, with_reference
+from rig_identification.mismatch.search import MOST_EFFECTS, Trial, catalogue, trials
+from rig_identification.result import Finding, Mismatch
+
+Notify = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Explained:
+    """A fit with effects in it."""
+
+    fitted: Fitted
+    mismatch: Mismatch
+
+
+def explain(ideal: Fitted, verdict: Mismatch, careful: Evaluation | None, notify: Notify) -> Explained | None:
+    """Search for what the ideal model leaves out; None where nothing is found.
+
+    verdict: of the ideal model. careful: the cautious fit, where there is one: the search then
+    starts from its body, in short pieces.
+    """
+    problem = with_reference(ideal.problem, ideal.rest)
+    candidates = catalogue(problem)
+    here, evaluation = problem, ideal.evaluation
+    if verdict.verdict == "unexplained" and careful is not None:
+        notify("search: short pieces", 0.0)
+        guesses = careful.point.rest_guesses
+        here, evaluation, _ = solve_in_pieces(problem, careful.point.theta, ideal.rest, guesses)
+    found: list[Trial] = []
+    rivals: list[dict[str, object]] = []
+    best: Explained | None = None
+    for step in range(MOST_EFFECTS):
+        left = [c for c in candidates if c.label not in {t.candidate.label for t in found}]
+        done = trials(
+            here,
+            evaluation,
+            left,
+            ORDINARY,
+            lambda label, k=step: notify(f"search: {label}", (k + 0.5) / (MOST_EFFECTS + 1)),  # type: ignore[misc]
+        )
+        if not done:
+            break
+        found.append(done[0])
+        rivals += [
+            {
+                "effect": t.candidate.effect,
+                "where": dict(t.candidate.where),
+                "log_likelihood_gap": float(done[0].evidence - t.evidence),
+            }
+            for t in done[1:]
+        ]
+        here, evaluation = done[0].problem, done[0].evaluation
+        notify("search: whole runs with " + ", ".join(t.candidate.label for t in found), (step + 0.9) / (MOST_EFFECTS + 1))
+        best = _whole(ideal, problem, found, rivals)
+        if best.mismatch.verdict == "explained":
+            break
+    return best
+
+
+def _whole(ideal: Fitted, problem: Problem, found: list[Trial], rivals: list[dict[str, object]]) -> Explained:
+    """Fit the whole runs with the effects found, and predict the held-out ones."""
+    last = found[-1]
+    whole = extended(problem, tuple(p for t in found for p in t.candidate.parameters))
+    point = carried(whole, last.problem, last.evaluation.point)
+    starts = tuple(launch_state(whole.bench, run, point.theta, ideal.rest) for run in whole.runs)
+    point = Point(point.theta, starts, point.rest_guesses)
+    evaluation, converged = solve(whole, point, iterations=20)
+    held_runs, held = [], []
+    for run in ideal.holdout_runs:
+        state = launch_state(whole.bench, run, evaluation.point.theta, ideal.rest)
+        result = fit_start_growing(whole.bench, run, evaluation.point.theta, state)
+        if result is not None:
+            held_runs.append(run)
+            held.append(result[0])
+    fitted = replace(
+        ideal,
+        problem=whole,
+        evaluation=evaluation,
+        converged=converged,
+        holdout_runs=tuple(held_runs),
+        holdouts=tuple(held),
+    )
+    return Explained(fitted, _mismatch(ideal, fitted, found, rivals))
+
+
+def _mismatch(ideal: Fitted, fitted: Fitted, found: list[Trial], rivals: list[dict[str, object]]) -> Mismatch:
+    before, after = scores(ideal), scores(fitted)
+    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
+    judged = judge(fitted, parameters, after.holdout, after.training, ORDINARY)
+    gain = ideal.evaluation.cost - fitted.evaluation.cost
+    values = {p.name: p.value for p in parameters}
+    stds = {p.name: p.std for p in parameters}
+    findings = tuple(_finding(t, values, stds, gain, before.holdout, after.holdout) for t in found)
+    named = ", ".join(f.effect for f in findings)
+    if judged.verdict == "none":
+        text = f"With {named} in the model every residual is noise. Held-out error "
+        text += f"{_number(before.holdout)} before, {_number(after.holdout)} after (1 is a perfect model)."
+        return Mismatch("explained", text, findings, tuple(rivals))
+    text = f"{named} explains part of it; something is left. {judged.explanation}"
+    return Mismatch("unexplained", text, findings, tuple(rivals))
+
+
+def _number(value: float | None) -> str:
+    return "not known" if value is None else f"{value:.3g}"
+
+
+def _finding(
+    trial: Trial,
+    values: dict[str, float],
+    stds: dict[str, float],
+    gain: float,
+    before: float | None,
+    after: float | None,
+) -> Finding:
+    candidate = trial.candidate
+    told = candidate.told(values, stds)
+    first = next(iter(told.values()))
+    shown = f"{first[0]:.4g} ± {first[1]:.2g}" + ("" if first[2] == "1" else f" {first[2]}")
+    where = dict(candidate.where)
+    if candidate.effect == "tether":
+        where["position"] = [values[f"tether.point.{a}"] for a in "xyz"]
+    if candidate.effect == "imu_misalignment":
+        where["axis"] = max("xyz", key=lambda a: abs(told[f"angle_{a}"][0]))
+    sentence = candidate.sentence.format(value=shown, channel=where.get("channel"))
+    return Finding(
+        candidate.effect,
+        where,
+        {name: {"value": float(v), "std": float(s), "unit": unit} for name, (v, s, unit) in told.items()},
+        {
+            "log_likelihood_gain": float(gain),
+            "holdout_error_before": None if before is None else float(before),
+            "holdout_error_after": None if after is None else float(after),
+        },
+        f"{sentence} {candidate.advice}",
+    )

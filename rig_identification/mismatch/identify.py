@@ -1,0 +1,52 @@
+"""The whole answer to a session: the ideal model, its verdict, and what it leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from rig_identification.estimate.identify import compose, fit_ideal, scores
+from rig_identification.mismatch.explain import explain
+from rig_identification.recording import Session
+from rig_identification.result import Identification
+
+Progress = Callable[[str, float], None]
+
+#: Share of the progress bar that the ideal model's fit takes.
+IDEAL_SHARE = 0.4
+
+
+def identify(session: Session, progress: Progress | None = None) -> Identification:
+    """Mass, centre of mass and inertia tensor, with whatever the ideal model leaves out found and modelled.
+
+    ``figures["ideal"]`` of the result holds the ideal model's own answer where effects were found.
+
+    Raises InputError where the session holds nothing to fit.
+    """
+
+    def notify(stage: str, fraction: float) -> None:
+        if progress is not None:
+            progress(stage, fraction)
+
+    ideal = fit_ideal(session, lambda stage, fraction: notify(stage, IDEAL_SHARE * fraction))
+    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
+    if not ideal.fitted.problem.runs:
+        return plain
+    careful = None if ideal.careful is None else ideal.careful[1]
+    found = explain(
+        ideal.fitted,
+        ideal.mismatch,
+        careful,
+        lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
+    )
+    if found is None:
+        return plain
+    unexplained = found.mismatch.verdict == "unexplained"
+    answer = compose(
+        session,
+        found.fitted,
+        scores(found.fitted),
+        found.mismatch,
+        ideal.careful if unexplained else None,
+    )
+    return replace(answer, figures={**answer.figures, "ideal": plain})

@@ -1,0 +1,203 @@
+"""Sensor errors beyond what the lab believes: a doubt of the ideal model, freed."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
+from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.rig import Rig
+
+#: Plausible range (std of the prior once freed) of each error.
+RANGE = {
+    "load_cell_gain": 0.05,
+    "load_cell_zero": 200.0,
+    "gyroscope_bias": 0.05,
+    "accelerometer_bias": 1.0,
+    "gyroscope_scale": 0.05,
+    "accelerometer_scale": 0.05,
+    "position": 0.1,
+    "orientation": 0.1,
+    "clock": 0.05,
+    "gain": 0.05,
+    "zero": 0.05,
+}
+
+
+def freed(parameters: ParameterSet, name: str, std: float) -> Parameter | None:
+    """A free parameter with the wide prior; None where the session has it not."""
+    for p in parameters.free:
+        if p.name == name:
+            return Parameter(name, p.unit, p.nominal, max(std, 10.0 * p.prior_std), p.kind, p.index, bounded=False)
+    return None
+
+
+def _one(
+    parameters: ParameterSet,
+    effect: str,
+    name: str,
+    std: float,
+    told: str,
+    sentence: str,
+    advice: str,
+    where: dict[str, object],
+) -> list[Candidate]:
+    p = freed(parameters, name, std)
+    if p is None:
+        return []
+    return [Candidate(effect, (p,), sentence, advice, where, name_in_result=told)]
+
+
+def _load_cells(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
+    out: list[Candidate] = []
+    for cable in rig.cables:
+        where: dict[str, object] = {"channel": cable.name, "axis": None}
+        out += _one(
+            parameters,
+            "load_cell_gain",
+            f"{cable.name}.load_cell_gain",
+            RANGE["load_cell_gain"],
+            "gain",
+            "The load cell of {channel} has a scale error of {value}: it reads that share too high.",
+            "Calibrate the cell with a known weight.",
+            where,
+        )
+        out += _one(
+            parameters,
+            "load_cell_offset",
+            f"{cable.name}.load_cell_zero",
+            RANGE["load_cell_zero"],
+            "offset",
+            "The load cell of {channel} reads {value} at no load.",
+            "Zero the cell while the cable hangs free.",
+            where,
+        )
+    return out
+
+
+def _imu(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
+    out: list[Candidate] = []
+    for a in AXES:
+        where: dict[str, object] = {"channel": "imu", "axis": a}
+        for kind, quantity, unit_name in (
+            ("gyroscope", "angular_rate", "gyroscope"),
+            ("accelerometer", "specific_force", "accelerometer"),
+        ):
+            out += _one(
+                parameters,
+                "imu_bias",
+                f"imu.{kind}_bias.{a}",
+                RANGE[f"{kind}_bias"],
+                quantity,
+                f"The {unit_name}'s {a} axis reads {{value}} too much.",
+                "Average the unit at rest and take the mean off, or replace it.",
+                where,
+            )
+            out += _one(
+                parameters,
+                "imu_scale",
+                f"imu.{kind}_scale.{a}",
+                RANGE[f"{kind}_scale"],
+                "scale",
+                f"The {unit_name}'s {a} axis has a scale error of {{value}}.",
+                "Calibrate the unit on a turntable, or against gravity in six positions.",
+                where,
+            )
+        out += _one(
+            parameters,
+            "imu_position",
+            f"imu.position.{a}",
+            RANGE["position"],
+            "error",
+            f"The IMU sits {{value}} from where it is described, along the body's {a} axis.",
+            "Measure its place again.",
+            where,
+        )
+    turned = [freed(parameters, f"imu.orientation.{a}", RANGE["orientation"]) for a in AXES]
+    if rig.imu is not None and all(p is not None for p in turned):
+        to_imu = Rotation.from_quat(rig.imu.orientation).inv()
+
+        def angle(values: dict[str, float], stds: dict[str, float]) -> Told:
+            turn = to_imu.apply([values[f"imu.orientation.{a}"] for a in AXES])
+            spread = float(np.mean([stds[f"imu.orientation.{a}"] for a in AXES]))
+            axis = int(np.argmax(np.abs(turn)))
+            told: Told = {"angle": (float(turn[axis]), spread, "rad")}
+            for i, a in enumerate(AXES):
+                told[f"angle_{a}"] = (float(turn[i]), spread, "rad")
+            return told
+
+        out.append(
+            Candidate(
+                "imu_misalignment",
+                tuple(p for p in turned if p is not None),
+                "The IMU is turned by {value} against its description.",
+                "Measure its orientation again; the angles about its own axes are given.",
+                {"channel": "imu", "axis": None},
+                tell=angle,
+            )
+        )
+    return out
+
+
+def _inclinometer(parameters: ParameterSet) -> list[Candidate]:
+    out = []
+    if any(p.name.startswith("inclinometer.orientation") for p in parameters.free):
+        for i, a in enumerate("xy"):
+            entry = parameters.places.inclinometer + 3 + i
+            p = Parameter(f"inclinometer.zero.{a}", "rad", 0.0, RANGE["zero"], "device", entry, bounded=False)
+            out.append(
+                Candidate(
+                    "inclinometer_offset",
+                    (p,),
+                    f"The inclinometer's {a} axis reads {{value}} too much.",
+                    "Turn the inclinometer by 180 degrees on a level plate and halve the difference.",
+                    {"channel": "inclinometer", "axis": a},
+                    name_in_result="offset",
+                )
+            )
+    return out
+
+
+def _clocks_and_exciter(parameters: ParameterSet) -> list[Candidate]:
+    out: list[Candidate] = []
+    for device in ("imu", "inclinometer", "exciter", "mocap"):
+        out += _one(
+            parameters,
+            "clock_offset",
+            f"{device}.clock",
+            RANGE["clock"],
+            "offset",
+            f"The stamps of {device} are {{value}} late.",
+            "Synchronise the devices' clocks, or check for a buffer in the driver.",
+            {"channel": device, "axis": None},
+        )
+    gain = freed(parameters, "exciter.gain", RANGE["gain"])
+    if gain is not None:
+
+        def reads_high(values: dict[str, float], stds: dict[str, float]) -> Told:
+            # The model multiplies what was measured; the contract asks how much too high it reads
+            factor = values["exciter.gain"]
+            return {"gain": (1.0 / factor - 1.0, stds["exciter.gain"] / factor**2, "1")}
+
+        out.append(
+            Candidate(
+                "exciter_gain",
+                (gain,),
+                "The exciter's force cells have a scale error of {value}.",
+                "Calibrate the force cells under the motor.",
+                {"channel": "exciter", "axis": None},
+                tell=reads_high,
+            )
+        )
+    return out
+
+
+def sensor_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
+    """All sensor errors that this session's channels could have."""
+    return [
+        *_load_cells(rig, parameters),
+        *_imu(rig, parameters),
+        *_inclinometer(parameters),
+        *_clocks_and_exciter(parameters),
+    ]
