@@ -69,7 +69,7 @@ def solve_growing(
         evaluation, converged = solve(
             part,
             point,
-            iterations=40 if whole else 12,
+            iterations=20 if whole else 12,
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else _at(notify, end, duration),
         )

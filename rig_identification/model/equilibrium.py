@@ -188,7 +188,7 @@ def find_rest(
     J[0, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -in_gravity
     J[0, layout.OUT_TENSION :] = implicit[6:]
     density = layout.effects_offset(n) + LINEAR_DENSITY
-    for k in np.flatnonzero(chosen == density):
-        J[0, layout.OUT_TENSION :, k] += own_weights(model, x, R, per_density=True)
+    for column in np.flatnonzero(chosen == density):
+        J[0, layout.OUT_TENSION :, column] += own_weights(model, x, R, per_density=True)
     state = State(x[:3].copy(), R, np.zeros(3), np.zeros(3))
     return Rest(state, tension, outputs, J, converged)

@@ -32,7 +32,12 @@ def add_tether(physics, block, x, R, r):  # type: ignore[no-untyped-def]
     for i in range(3):
         t = block + REFERENCE_ROTATION + 3 * i
         here = x[i] + R[i, 0] * ax + R[i, 1] * ay + R[i, 2] * az
-        rest = physics[block + REFERENCE_POSITION + i] + physics[t] * ax + physics[t + 1] * ay + physics[t + 2] * az
+        rest = (
+            physics[block + REFERENCE_POSITION + i]
+            + physics[t] * ax
+            + physics[t + 1] * ay
+            + physics[t + 2] * az
+        )
         f = physics[block + TETHER_PULL + i] - physics[block + TETHER_STIFFNESS + i] * (here - rest)
         fx += R[i, 0] * f
         fy += R[i, 1] * f
