@@ -107,7 +107,9 @@ def test_inclinometer(seed: int) -> None:
     check(lambda raw, R, d: sensors.inclinometer(raw, turn, d), motion, device)
     axes = motion.R_world_body @ Rotation.from_rotvec(device[:3]).as_matrix() @ turn
     above = np.arctan2(axes[:, 2, :2], np.hypot(axes[:, 0, :2], axes[:, 1, :2]))
-    np.testing.assert_allclose(sensors.inclinometer(motion.outputs, turn, device).values - device[3:], above, atol=1e-12)
+    np.testing.assert_allclose(
+        sensors.inclinometer(motion.outputs, turn, device).values - device[3:], above, atol=1e-12
+    )
 
 
 @given(SEEDS)

@@ -1,4 +1,4 @@
-"""What a left-out effect is to the search: which parameters it frees or adds, and how it is told to a person."""
+"""A left-out effect as the search sees it: parameters that it frees or adds, and what a person is told."""
 
 from __future__ import annotations
 

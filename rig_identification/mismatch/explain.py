@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from rig_identification.estimate.growing import fit_start_growing
 from rig_identification.estimate.identify import ORDINARY, Fitted, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
@@ -65,7 +63,10 @@ def explain(ideal: Fitted, verdict: Mismatch, careful: Evaluation | None, notify
             for t in done[1:]
         ]
         here, evaluation = done[0].problem, done[0].evaluation
-        notify("search: whole runs with " + ", ".join(t.candidate.label for t in found), (step + 0.9) / (MOST_EFFECTS + 1))
+        notify(
+            "search: whole runs with " + ", ".join(t.candidate.label for t in found),
+            (step + 0.9) / (MOST_EFFECTS + 1),
+        )
         best = _whole(ideal, problem, found, rivals)
         if best.mismatch.verdict == "explained":
             break

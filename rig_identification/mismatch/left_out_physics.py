@@ -16,7 +16,9 @@ def _added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -
     return Parameter(name, unit, nominal, std, "physics", entry, bounded=False)
 
 
-def _tether(block: int, mass: float, gravity: float, length: float, size: float, middle: np.ndarray) -> Candidate:  # type: ignore[type-arg]
+def _tether(
+    block: int, mass: float, gravity: float, length: float, size: float, middle: np.ndarray
+) -> Candidate:
     spring = 0.2 * mass * gravity / length
     parts = [
         _added(f"tether.stiffness.{a}", "N/m", spring, block + place.TETHER_STIFFNESS + i)
@@ -67,7 +69,11 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     out = [
         Candidate(
             "hinge_damping",
-            (_added("hinge.damping", "N*m*s/rad", 0.1 * mass * length * speed / (2 * n), block + place.DAMPING),),
+            (
+                _added(
+                    "hinge.damping", "N*m*s/rad", 0.1 * mass * length * speed / (2 * n), block + place.DAMPING
+                ),
+            ),
             "The cables' hinges damp the motion: each puts {value} against the rate at which it turns.",
             "Use knife edges or ball joints, or keep the damping in the model.",
             {"channel": None, "axis": None},
@@ -96,7 +102,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "air_added_mass",
             (_added("air.added_mass", "kg", 0.02 * mass, block + place.ADDED_MASS),),
             "Air that moves with the body adds {value} to its inertia but not to its weight.",
-            "Motion alone cannot tell entrained air from inertia: it shows against the scale and the statics.",
+            "Motion alone cannot tell entrained air from inertia: it shows against scale and statics.",
             {"channel": None, "axis": None},
             positive=True,
             name_in_result="added_mass",

@@ -62,7 +62,7 @@ def rig_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
                         Candidate(
                             "hinge_position",
                             (p,),
-                            f"The {end} hinge of {{channel}} sits {{value}} from where it is described, along {a}.",
+                            f"The {end} hinge of {{channel}} sits {{value}} off its description, along {a}.",
                             "Measure the hinge's place again.",
                             {"channel": cable.name, "end": end, "axis": a},
                             tell=_error(p.name, float(point[i])),

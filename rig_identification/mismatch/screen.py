@@ -39,7 +39,9 @@ def with_reference(problem: Problem, rest: State) -> Problem:
     physics = parameters.model.physics.copy()
     block = effects_offset(parameters.model.cables)
     physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3] = rest.position
-    physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9] = rest.R_world_body.ravel()
+    physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9] = (
+        rest.R_world_body.ravel()
+    )
     model = parameters.model.with_physics(physics)
     return replace(problem, bench=replace(problem.bench, parameters=replace(parameters, model=model)))
 

@@ -48,7 +48,9 @@ class Trial:
 def catalogue(problem: Problem) -> list[Candidate]:
     """Every hypothesis that this session's rig and channels admit."""
     rig, parameters = problem.bench.rig, problem.bench.parameters
-    mass = float(parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0])
+    mass = float(
+        parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0]
+    )
     return [
         *sensor_errors(rig, parameters),
         *rig_errors(rig, parameters),
@@ -57,7 +59,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
 
 
 def needed_gain(candidate: Candidate, count: int) -> float:
-    """Gain (nats) that noise alone exceeds with probability FALSE_ALARM over ``count`` hypotheses (Wilks, Bonferroni)."""
+    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` hypotheses (Wilks, Bonferroni)."""
     return 0.5 * float(chi2.isf(FALSE_ALARM / count, len(candidate.parameters)))
 
 
@@ -97,7 +99,9 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
     """Whether a freed doubt really lies beyond what is ordinary: an addition always does."""
     parameters = trial.problem.bench.parameters
-    values = dict(zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True))
+    values = dict(
+        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
+    )
     freed = [p for p in trial.candidate.parameters if p.name in ordinary]
     if not freed:
         return True

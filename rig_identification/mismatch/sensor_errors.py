@@ -29,7 +29,9 @@ def freed(parameters: ParameterSet, name: str, std: float) -> Parameter | None:
     """A free parameter with the wide prior; None where the session has it not."""
     for p in parameters.free:
         if p.name == name:
-            return Parameter(name, p.unit, p.nominal, max(std, 10.0 * p.prior_std), p.kind, p.index, bounded=False)
+            return Parameter(
+                name, p.unit, p.nominal, max(std, 10.0 * p.prior_std), p.kind, p.index, bounded=False
+            )
     return None
 
 
