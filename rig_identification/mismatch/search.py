@@ -59,7 +59,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
 
 
 def needed_gain(candidate: Candidate, count: int) -> float:
-    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` hypotheses (Wilks, Bonferroni)."""
+    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks, Bonferroni)."""
     return 0.5 * float(chi2.isf(FALSE_ALARM / count, len(candidate.parameters)))
 
 
