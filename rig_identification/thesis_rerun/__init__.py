@@ -1,0 +1,19 @@
+"""The thesis, rerun: its case studies simulated, and four estimators side by side on each of them."""
+
+from rig_identification.thesis_rerun.comparison import Comparison, compare, signed_error, worst_percent
+from rig_identification.thesis_rerun.motion import CaseMotion, fly_case
+from rig_identification.thesis_rerun.rerun import CaseResult, Rerun, Trace, rerun, rerun_case
+
+__all__ = [
+    "CaseMotion",
+    "CaseResult",
+    "Comparison",
+    "Rerun",
+    "Trace",
+    "compare",
+    "fly_case",
+    "rerun",
+    "rerun_case",
+    "signed_error",
+    "worst_percent",
+]

@@ -1,0 +1,173 @@
+"""All case studies, one after the other or two at a time, with everything that is asked of each."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.model.equilibrium import design_pose, find_rest, settle
+from rig_identification.model.modes import Mode, natural_modes
+from rig_identification.model.motion import rig_model
+from rig_identification.thesis.case import Case, load_case
+from rig_identification.thesis_rerun.comparison import Comparison, compare
+from rig_identification.thesis_rerun.motion import CaseMotion, case_elements, fly_case
+from rig_identification.thesis_rerun.oddities import odd_statements
+from rig_identification.thesis_rerun.output_error import with_noise
+from rig_identification.thesis_rerun.realistic import Realistic, realistic_uncertainty
+from rig_identification.thesis_rerun.tracking import TrackingComparison, compare_tracking
+from rig_identification.thesis_rerun.unknown_force import UnknownForceFit, fit_with_unknown_force
+from rig_identification.thesis_rerun.windows import ConvergenceMap, convergence_map
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+#: Part of each motion that is drawn, s, and samples a second.
+DRAWN, DRAWN_RATE = 20.0, 50
+#: Case whose data case 5 uses, and the case and time, s, on which the trackers are compared.
+MAPPED, TRACKED, TRACKED_FOR = 5, 10, 250.0
+#: Seed of every simulated noise.
+SEED = 0
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One quantity of the centre of mass as measured, and as the identified tensors predict it."""
+
+    quantity: str  # "position", "acceleration", "rotational velocity"
+    unit: str
+    time: Array  # (k,) s
+    measured: Array  # (k, 3)
+    predicted: dict[str, Array]  # letter of the estimator -> (k, 3)
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """Everything about one case."""
+
+    case: Case
+    least_tension: float  # N
+    comparison: Comparison
+    realistic: Realistic | None
+    unknown_force: UnknownForceFit | None
+    windows: ConvergenceMap | None
+    modes: tuple[Mode, ...]
+    traces: tuple[Trace, ...]
+    statements: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """The thesis, rerun."""
+
+    cases: tuple[CaseResult, ...]
+    tracking: TrackingComparison | None
+
+
+def rerun_case(case: Case) -> CaseResult:
+    """Simulate one case and run every estimator on it."""
+    case = with_noise(case)
+    motion = fly_case(case)
+    comparison = compare(motion)
+    unknown = None
+    if not case.force_measured:
+        unknown = fit_with_unknown_force(motion, case.window, case.initial_guess)
+    windows = convergence_map(motion, comparison.momentum.inertia) if case.number == MAPPED else None
+    return CaseResult(
+        case,
+        motion.least_tension,
+        comparison,
+        realistic_uncertainty(case, SEED),
+        unknown,
+        windows,
+        modes_of(case),
+        _traces(motion, comparison),
+        odd_statements(motion, comparison),
+    )
+
+
+def modes_of(case: Case) -> tuple[Mode, ...]:
+    """Natural modes of a case's body on its rig."""
+    model = rig_model(case.rig, case_elements(case))
+    rest = find_rest(model, settle(model, design_pose(model)))
+    return natural_modes(model, rest.state)
+
+
+def rerun(cases: tuple[Case, ...], progress: Progress, workers: int = 2, tracking: bool = True) -> Rerun:
+    """Every case of ``cases``, ``workers`` processes at a time; progress(what, fraction done)."""
+    jobs = [(case.number, case.variant) for case in cases]
+    if workers < 2 or len(jobs) + tracking < 2:
+        found = _in_turn(jobs, progress)
+        return Rerun(found, _track(progress) if tracking else None)
+    results: dict[tuple[int, str], CaseResult] = {}
+    for label, result in _side_by_side(jobs, tracking, workers, progress):
+        results[label] = result
+    trackers = results.pop((0, ""), None)
+    return Rerun(tuple(results[job] for job in jobs), trackers)  # type: ignore[arg-type]
+
+
+def _in_turn(jobs: list[tuple[int, str]], progress: Progress) -> tuple[CaseResult, ...]:
+    found = []
+    for k, job in enumerate(jobs):
+        progress(f"case {job[0]}{job[1]}", k / len(jobs))
+        found.append(_work(job))
+    return tuple(found)
+
+
+def _track(progress: Progress) -> TrackingComparison | None:
+    progress("tracker beside integration", 1.0)
+    return compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED)
+
+
+def _work(job: tuple[int, str]):  # type: ignore[no-untyped-def]
+    """A case, or the trackers for number 0: what a process is given to do."""
+    return compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED) if job[0] == 0 else rerun_case(load_case(*job))
+
+
+def _side_by_side(  # type: ignore[no-untyped-def]
+    jobs: list[tuple[int, str]], tracking: bool, workers: int, progress: Progress
+) -> Iterator[tuple[tuple[int, str], CaseResult]]:
+    # The long ones first, so that no process ends up alone with one of them
+    order = [(0, "")] * tracking + sorted(jobs, key=lambda job: job[0] not in (3, 4, MAPPED))
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        try:
+            waiting = {pool.submit(_work, job): job for job in order}
+            while waiting:
+                done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in done:
+                    job = waiting.pop(future)
+                    name = f"case {job[0]}{job[1]}" if job[0] else "tracker beside integration"
+                    progress(f"{name} done", 1.0 - len(waiting) / len(order))
+                    yield job, future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _traces(motion: CaseMotion, comparison: Comparison) -> tuple[Trace, ...]:
+    """Position, acceleration, rotational velocity, in the order of the thesis' figures."""
+    case = motion.case
+    until = min(DRAWN, case.duration)
+    tensors = comparison.tensors
+    flown = {key: fly_case(case, inertia=tensors[key], duration=until) for key in "ad" if _can_fly(tensors[key])}
+    every = round(1.0 / DRAWN_RATE / float(motion.time[1]))
+    nodes = np.arange(0, round(until / float(motion.time[1])) + 1, every)
+
+    def trace(quantity: str, unit: str, attribute: str) -> Trace:
+        predicted = {key: getattr(other, attribute)[nodes] for key, other in flown.items()}
+        return Trace(quantity, unit, motion.time[nodes], getattr(motion, attribute)[nodes], predicted)
+
+    return (
+        trace("position", "m", "center"),
+        trace("acceleration", "m/s²", "acceleration"),
+        trace("rotational velocity", "rad/s", "rate"),
+    )
+
+
+def _can_fly(inertia: Array) -> bool:
+    """Whether a body can move with this tensor at all."""
+    return bool(np.isfinite(inertia).all() and np.linalg.eigvalsh(inertia)[0] > 0.0)

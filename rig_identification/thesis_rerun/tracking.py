@@ -1,0 +1,176 @@
+"""Chapter 3's pose from gyroscope and accelerometer alone, beside a tracker that the cables and gravity hold.
+
+Both see one simulated session of a rig as described, with the noise of good industrial sensors.
+Integration starts from the true pose and velocity, which no lab knows; the tracker starts from
+rest and geometry and takes its body from the momentum regression (estimate/launch.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from rig_identification.estimate.identify import pose_problem
+from rig_identification.estimate.launch import Launch, tracked
+from rig_identification.estimate.prediction import model_at, start_basis
+from rig_identification.estimate.track import BLOCK, Track
+from rig_identification.live import strapdown
+from rig_identification.model.motion import RigModel, State
+from rig_identification.recording import Recording, Session, Series
+from rig_identification.simulate import case_spec, simulate_session
+from rig_identification.thesis.case import Case
+
+Array = NDArray[np.float64]
+
+#: Compared so often, s.
+EVERY = 0.1
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """Error of a tracked pose over time."""
+
+    time: Array  # (k,) s
+    position: Array  # (k,) m
+    attitude: Array  # (k,) rad
+
+    @property
+    def position_rms(self) -> float:
+        """m."""
+        return float(np.sqrt(np.mean(self.position**2)))
+
+    @property
+    def attitude_rms(self) -> float:
+        """rad."""
+        return float(np.sqrt(np.mean(self.attitude**2)))
+
+
+@dataclass(frozen=True)
+class TrackingComparison:
+    """Both on the same recording."""
+
+    case: str
+    duration: float  # s
+    held: PoseError
+    integrated: PoseError
+    freedom: int  # of the state that the cables leave
+    nees: float  # mean of e^T P^-1 e / freedom: 1 is consistent
+    within_95: float  # share of instants at which it lies below chi-square's 95 % point
+
+
+@dataclass(frozen=True)
+class _Truth:
+    """The recorded ground truth at any time."""
+
+    position: CubicSpline
+    quaternion: CubicSpline
+    velocity: CubicSpline  # world
+    rate: CubicSpline  # body
+
+    @classmethod
+    def of(cls, series: Series) -> _Truth:
+        v = series.values
+        quaternion = v[:, 3:7].copy()
+        turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
+        quaternion[1:][np.cumsum(turned) % 2 == 1] *= -1.0
+        velocity = Rotation.from_quat(quaternion).apply(v[:, 7:10])
+        parts = (v[:, :3], quaternion, velocity, v[:, 10:13])
+        return cls(*(CubicSpline(series.time, part) for part in parts))
+
+    def turn(self, time: Array) -> Rotation:
+        return Rotation.from_quat(self.quaternion(time))
+
+
+def compare_tracking(case: Case, duration: float, seed: int) -> TrackingComparison | None:
+    """Track one case over ``duration`` s both ways; None where the tracker cannot follow."""
+    spec = case_spec(case, duration=duration, holdout=False, doubts=False, rods=True)
+    session, _ = simulate_session(spec, np.random.default_rng(seed))
+    found = _tracked(session)
+    if found is None:
+        return None
+    track, model = found
+    recording = session.training[0]
+    if recording.ground_truth is None:
+        raise AssertionError("the simulator records the true pose")
+    truth = _Truth.of(recording.ground_truth)
+    step = float(track.time[1])
+    # One node before a block's end: all but its last node's samples have been used, as in the covariance
+    nodes = np.arange(round(BLOCK / step) - 1, track.time.size - round(BLOCK / step), round(EVERY / step))
+    held, nees, freedom = _held_error(track, model, truth, nodes)
+    within = float(np.mean(nees < chi2.ppf(0.95, freedom)))
+    return TrackingComparison(
+        case.label,
+        duration,
+        held,
+        _integrated_error(session, recording, truth),
+        freedom,
+        float(np.mean(nees)) / freedom,
+        within,
+    )
+
+
+def _tracked(session: Session) -> tuple[Track, RigModel] | None:
+    problem, theta, _ = pose_problem(session)
+    launch = Launch(problem, theta).from_rest().from_momentum()
+    if launch.rest is None:
+        return None
+    track = tracked(problem.bench, problem.runs[0], launch.theta, launch.rest)
+    return None if track is None else (track, model_at(problem.bench.parameters, launch.theta))
+
+
+def _held_error(
+    track: Track, model: RigModel, truth: _Truth, nodes: NDArray[np.int64]
+) -> tuple[PoseError, Array, int]:
+    """Pose error, normalised squared error of the state at ``nodes``, and the state's freedom."""
+    time = track.time[nodes]
+    true_turn = truth.turn(time)
+    offset = np.zeros((time.size, 12))
+    offset[:, :3] = truth.position(time) - track.states[nodes, :3]
+    offset[:, 3:6] = (Rotation.from_matrix(track.R_world_body[nodes]).inv() * true_turn).as_rotvec()
+    offset[:, 6:9] = truth.velocity(time) - track.states[nodes, 6:9]
+    offset[:, 9:12] = truth.rate(time) - track.states[nodes, 9:12]
+    nees, freedom = np.zeros(time.size), 0
+    for k, node in enumerate(nodes):
+        x = track.states[node]
+        basis = start_basis(model, State(x[:3], track.R_world_body[node], x[6:9], x[9:12]))
+        freedom = basis.shape[1]
+        coordinates = np.linalg.pinv(basis)
+        spread = coordinates @ track.covariance[node] @ coordinates.T
+        own = coordinates @ offset[k]
+        nees[k] = own @ np.linalg.solve(spread, own)
+    pose = PoseError(time, np.linalg.norm(offset[:, :3], axis=1), np.linalg.norm(offset[:, 3:6], axis=1))
+    return pose, nees, freedom
+
+
+def _integrated_error(session: Session, recording: Recording, truth: _Truth) -> PoseError:
+    """The same pose by integration alone from the true start."""
+    rig, imu = session.rig, recording.imu
+    if imu is None or rig.imu is None:
+        raise AssertionError("the case studies mount an IMU")
+    turn_imu = Rotation.from_quat(rig.imu.orientation).as_matrix()
+    rate, force = imu.values[:, :3] @ turn_imu.T, imu.values[:, 3:] @ turn_imu.T
+    begin = int(np.searchsorted(imu.time, truth.position.x[0] + 1e-9))
+    first = imu.time[begin : begin + 1]
+    R = np.array(truth.turn(first).as_matrix()[0], order="C")
+    arm = np.asarray(rig.imu.position, dtype=float)
+    p = truth.position(first)[0] + R @ arm
+    v = truth.velocity(first)[0] + R @ np.cross(truth.rate(first)[0], arm)
+    bias, P, noise = np.zeros(6), np.zeros((strapdown.ERRORS,) * 2), np.zeros(4)
+    every = max(1, round(EVERY / float(np.median(np.diff(imu.time)))))
+    last = int(np.searchsorted(imu.time, truth.position.x[-1])) - 1
+    time, position, attitude = [], [], []
+    for k in range(begin, last):
+        dt = float(imu.time[k + 1] - imu.time[k])
+        mean_rate, mean_force = 0.5 * (rate[k] + rate[k + 1]), 0.5 * (force[k] + force[k + 1])
+        strapdown.propagate_sample(p, R, v, bias, P, mean_rate, mean_force, dt, rig.gravity, noise)
+        if (k + 1 - begin) % every == 0:
+            at = imu.time[k + 1]
+            time.append(float(at))
+            position.append(float(np.linalg.norm(truth.position(at) - (p - R @ arm))))
+            attitude.append((Rotation.from_matrix(R).inv() * truth.turn(at)).magnitude())
+    return PoseError(np.array(time), np.array(position), np.array(attitude))
