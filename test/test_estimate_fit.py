@@ -19,7 +19,7 @@ from rig_identification.estimate.momentum import balance, momentum_map, regress,
 from rig_identification.estimate.observability import elements_covariance, inertial_estimate
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import model_at
-from rig_identification.estimate.solve import Point, evaluate
+from rig_identification.estimate.solve import Point, evaluate, on_plateau
 from rig_identification.estimate.track import Track
 from rig_identification.model.body import (
     elements_from_linear,
@@ -163,6 +163,45 @@ def test_a_bifilar_pendulum_is_fitted_from_no_guess() -> None:
     jzz = ELEMENTS.index("Jzz")
     std = np.sqrt(estimate.covariance[jzz, jzz])
     assert abs(estimate.values[jzz] - truth.elements[jzz]) < 4.0 * std
+
+
+def test_no_optimum_where_nothing_answers_any_more() -> None:
+    session, truth = recorded(random_sample(33, 3), seed=5, duration=2.0)
+    problem, _, _ = pose_problem(session)
+    rest = rest_state(model_at(problem.bench.parameters, vector_of(problem, truth)))
+
+    def plateau(scale: float) -> bool:
+        elements = truth.elements.copy()
+        elements[4:] *= scale
+        theta = problem.bench.parameters.start(elements)
+        evaluation = evaluate(problem, Point(theta, (truth.starts["run_1"],), (rest,) * len(problem.rests)))
+        assert evaluation is not None
+        return on_plateau(evaluation)
+
+    assert not plateau(1.0)
+    assert not plateau(3.0)
+    assert plateau(1e9)
+
+
+def test_what_the_lab_is_certain_of_is_not_free() -> None:
+    session, _ = recorded(random_sample(33, 3), seed=5, duration=2.0)
+    tolerance = {
+        **session.rig.tolerance,
+        "imu_position": 0.0,
+        "cable_length": 0.0,
+        "clock": 0.0,
+        "level": 0.0,
+    }
+    problem, theta, _ = pose_problem(replace(session, rig=replace(session.rig, tolerance=tolerance)))
+    names = [p.name for p in problem.bench.parameters.free]
+    certain = ("imu.position", ".length", ".clock", "level.")
+    assert not [n for n in names if any(c in n for c in certain)]
+    assert "imu.orientation.x" in names
+    rest = rest_state(model_at(problem.bench.parameters, theta))
+    evaluation = evaluate(problem, Point(theta, (rest,), (rest,) * len(problem.rests)))
+    assert evaluation is not None
+    assert np.all(np.isfinite(evaluation.gradient))
+    assert np.all(np.linalg.eigvalsh(evaluation.information) > 0.0)
 
 
 def test_the_held_out_run_touches_nothing_but_its_own_start() -> None:

@@ -214,17 +214,18 @@ def _step_within_bounds(
 
 #: Mean square of the whitened residuals above which a fit explains nothing.
 HOPELESS = 100.0
-#: Share of its first information on the body that a fit must keep to count as an optimum.
-VANISHED = 1e-4
 
 
-def _on_plateau(first: Evaluation, last: Evaluation) -> bool:
-    """Whether a fit ran off to a body so large or small that the recordings no longer feel it."""
-    residual = np.concatenate([np.zeros(1), *(run.residual for run in last.runs)])
-    if float(np.mean(residual**2)) < HOPELESS:
-        return False
-    told, tells = (np.diag(e.information)[:INERTIAL] - e.prior_information[:INERTIAL] for e in (first, last))
-    return bool(np.any(tells < VANISHED * told))
+def on_plateau(evaluation: Evaluation) -> bool:
+    """Whether nothing fits, and the body is so large or small that the recordings no longer feel it.
+
+    They do not where they say less of an entry of its vector than the weak prior does.
+    """
+    residual = np.concatenate([np.zeros(1), *(run.residual for run in evaluation.runs)])
+    told = np.diag(evaluation.information)[:INERTIAL]
+    vague = told < 2.0 * evaluation.prior_information[:INERTIAL]
+    # The mass is known from the scale, whatever the motion says
+    return bool(np.mean(residual**2) > HOPELESS and np.any(vague[1:]))
 
 
 def solve(
@@ -241,16 +242,16 @@ def solve(
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum.
     A plateau, where nothing fits and nothing answers any more, does not count.
     """
-    first = evaluate(problem, point)
-    if first is None:
+    current = evaluate(problem, point)
+    if current is None:
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
-    current, damping = first, 1e-6
+    damping = 1e-6
     for iteration in range(iterations):
         while True:
             change = _bounded_step(problem, current, damping)
             gain = 0.5 * float(change @ current.gradient)
             if gain < tolerance and damping <= 1e-3:
-                return current, not _on_plateau(first, current)
+                return current, not on_plateau(current)
             trial = evaluate(problem, _moved(problem, current, change))
             if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
                 damping = max(damping * 0.1, 1e-9)
