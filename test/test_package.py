@@ -29,6 +29,8 @@ ALLOWED = {
     "mismatch": {"model", "statics", "estimate"},
     "thesis": CORE,
     "simulate": CORE | {"thesis"},
+    "thesis_rerun": CORE | {"thesis", "simulate"},
+    "thesis_report": CORE | {"thesis", "thesis_rerun", "report"},
     "session": set(),
     "report": CORE,
     "live": {"model", "statics", "estimate"},

@@ -34,7 +34,9 @@ class Mode:
 
     frequency: float  # Hz; 0: the body moves without being driven back
     decay: float  # 1/s, rate at which the swing dies out
-    energy: Array  # (6,) share of the kinetic energy: centre of mass along world x y z, turning about body x y z
+    energy: (
+        Array  # (6,) share of the kinetic energy: centre of mass along world x y z, turning about body x y z
+    )
     displacement: Array  # (3,) m of the centre of mass, world, scaled
     turn: Array  # (3,) rad, body axes, scaled alike
 

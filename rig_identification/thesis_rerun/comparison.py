@@ -77,7 +77,9 @@ def fitted_window(case: Case) -> tuple[float, float]:
 def signed_error(case: Case, inertia: Array) -> Array:
     """(3, 3) as the thesis prints errors: percent of the true element, kg m^2 where that is zero."""
     true = case.inertia
-    return np.asarray(np.where(true == 0.0, inertia - true, 100.0 * (inertia - true) / np.where(true == 0.0, 1.0, true)))
+    return np.asarray(
+        np.where(true == 0.0, inertia - true, 100.0 * (inertia - true) / np.where(true == 0.0, 1.0, true))
+    )
 
 
 def worst_percent(case: Case, inertia: Array) -> float:

@@ -122,7 +122,16 @@ def fly_case(case: Case, *, inertia: Array | None = None, duration: float | None
         states[here], rotations[here], out[here] = motion.states, motion.R_world_body, motion.outputs
         force[here], state = plain, motion.state(last - first)
     return CaseMotion(
-        case, model, STEP * np.arange(nodes), states[:, :3], rotations, states[:, 6:9], out, force, held, jumps
+        case,
+        model,
+        STEP * np.arange(nodes),
+        states[:, :3],
+        rotations,
+        states[:, 6:9],
+        out,
+        force,
+        held,
+        jumps,
     )
 
 

@@ -60,9 +60,7 @@ def _at_truth(problem: Problem, truth: Truth, begin: float) -> Evaluation | None
     parameters = replace(parameters, model=rods)
     theta = parameters.start(truth.elements)
     values = np.array([truth.parameters[p.name] for p in parameters.free])
-    theta[INERTIAL:] = [
-        (v - p.nominal) / p.prior_std for v, p in zip(values, parameters.free, strict=True)
-    ]
+    theta[INERTIAL:] = [(v - p.nominal) / p.prior_std for v, p in zip(values, parameters.free, strict=True)]
     model = model_at(parameters, theta)
     run = problem.runs[0]
     state = truth.starts[run.recording.name]
@@ -71,5 +69,10 @@ def _at_truth(problem: Problem, truth: Truth, begin: float) -> Evaluation | None
         state = simulate(model, state, drive(run, parameters, theta)).state(node)
         run = run.between(node, run.grid.nodes - 1)
     rest = rest_of(model)
-    posed = replace(problem, bench=replace(problem.bench, parameters=parameters), runs=(run,), weak_center=theta[:INERTIAL])
+    posed = replace(
+        problem,
+        bench=replace(problem.bench, parameters=parameters),
+        runs=(run,),
+        weak_center=theta[:INERTIAL],
+    )
     return evaluate(posed, Point(theta, (state,), (rest,) * len(problem.rests)))

@@ -125,7 +125,11 @@ def _track(progress: Progress) -> TrackingComparison | None:
 
 def _work(job: tuple[int, str]):  # type: ignore[no-untyped-def]
     """A case, or the trackers for number 0: what a process is given to do."""
-    return compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED) if job[0] == 0 else rerun_case(load_case(*job))
+    return (
+        compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED)
+        if job[0] == 0
+        else rerun_case(load_case(*job))
+    )
 
 
 def _side_by_side(  # type: ignore[no-untyped-def]
@@ -153,7 +157,9 @@ def _traces(motion: CaseMotion, comparison: Comparison) -> tuple[Trace, ...]:
     case = motion.case
     until = min(DRAWN, case.duration)
     tensors = comparison.tensors
-    flown = {key: fly_case(case, inertia=tensors[key], duration=until) for key in "ad" if _can_fly(tensors[key])}
+    flown = {
+        key: fly_case(case, inertia=tensors[key], duration=until) for key in "ad" if _can_fly(tensors[key])
+    }
     every = round(1.0 / DRAWN_RATE / float(motion.time[1]))
     nodes = np.arange(0, round(until / float(motion.time[1])) + 1, every)
 

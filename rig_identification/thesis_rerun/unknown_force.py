@@ -18,7 +18,12 @@ from rig_identification.estimate.solve import Point, solve
 from rig_identification.model.body import tensor
 from rig_identification.model.motion import on_cables
 from rig_identification.thesis_rerun.motion import STEP, CaseMotion
-from rig_identification.thesis_rerun.output_error import nearest_body, noise_free_run, state_at, tensor_problem
+from rig_identification.thesis_rerun.output_error import (
+    nearest_body,
+    noise_free_run,
+    state_at,
+    tensor_problem,
+)
 
 Array = NDArray[np.float64]
 

@@ -15,12 +15,21 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import linearise_run
-from rig_identification.model.body import complex_step_jacobian, elements_from_linear, linear_from_log_cholesky
+from rig_identification.model.body import (
+    complex_step_jacobian,
+    elements_from_linear,
+    linear_from_log_cholesky,
+)
 from rig_identification.thesis.estimators import fit_euler_predictor
 from rig_identification.thesis.predictor import tensor
 from rig_identification.thesis_rerun.comparison import measured
 from rig_identification.thesis_rerun.motion import STEP, CaseMotion
-from rig_identification.thesis_rerun.output_error import HELD_ENTRIES, noise_free_run, state_at, tensor_problem
+from rig_identification.thesis_rerun.output_error import (
+    HELD_ENTRIES,
+    noise_free_run,
+    state_at,
+    tensor_problem,
+)
 
 Array = NDArray[np.float64]
 
@@ -64,7 +73,9 @@ def _output_error(motion: CaseMotion, near: Array, start: Array) -> tuple[Array,
     columns, inertial = lin.jacobian[:, free], INERTIAL - len(HELD_ENTRIES)
     # Rows of a jump's neighbours hold what no fit can follow: how the force rose within a node interval
     calm = np.min(np.abs(lin.nodes[:, None] - motion.jumps[None]), axis=1) > 1
-    in_elements = complex_step_jacobian(lambda t: elements_from_linear(linear_from_log_cholesky(t)), theta[:INERTIAL])
+    in_elements = complex_step_jacobian(
+        lambda t: elements_from_linear(linear_from_log_cholesky(t)), theta[:INERTIAL]
+    )
     in_elements = in_elements[4:, [k for k in range(INERTIAL) if k not in HELD_ENTRIES]]
     about = problem.bench.parameters.elements(theta)[4:]
     tensors, stds = [], []

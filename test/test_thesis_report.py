@@ -1,0 +1,67 @@
+"""``rig-identification thesis``: one case from the command line, its numbers, its page and its figures."""
+
+import json
+from xml.etree import ElementTree
+
+import pytest
+
+from rig_identification.cli.main import main
+from rig_identification.thesis import load_case
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("thesis") / "out"
+    assert main(["thesis", "--case", "8", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_numbers(written):
+    document = json.loads((written / "thesis.json").read_text())
+    (case,) = document["cases"]
+    assert case["case"] == "8"
+    assert case["true"] == load_case(8).inertia.tolist()
+    assert case["errors"]["published"]["xz"] == pytest.approx(124.04)
+    assert case["output_error"]["worst_percent"] < 0.01
+    assert set(case["searches"]) == {"gauss_newton", "levenberg_marquardt", "regularized_gauss_newton"}
+    assert len(case["modes"]) == 2
+    assert any("four cables at their length" in sentence for sentence in case["statements"])
+    assert any("misses the published" in sentence for sentence in case["statements"])
+
+
+def test_figures_stand_alone_in_the_order_of_the_thesis(written):
+    names = sorted(path.name for path in written.glob("*.svg"))
+    assert names == [
+        "case_08_1_position.svg",
+        "case_08_2_acceleration.svg",
+        "case_08_3_rotational_velocity.svg",
+    ]
+    for name in names:
+        root = ElementTree.parse(written / name).getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert len(root.findall(".//{*}path[@class='measured']")) == 3
+
+
+def test_page_holds_the_table_and_loads_nothing(written):
+    page = (written / "report.html").read_text()
+    assert "(a) thesis' predictor" in page or "(a) thesis&#39; predictor" in page
+    assert "171.89" in page or ">172<" in page
+    assert "src=" not in page
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--case", "19"], "the thesis has cases 1 to 18"),
+        (["--case", "x"], "is no case study"),
+        (["--case", "8b"], "only case 18 has variants"),
+        (["--case", "8", "--workers", "0"], "give at least 1"),
+    ],
+)
+def test_unusable_arguments_are_named_in_one_line(arguments, message, tmp_path, capsys):
+    assert main(["thesis", *arguments, "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err.strip()
+    assert message in error
+    assert "\n" not in error
+    assert not (tmp_path / "out").exists()
