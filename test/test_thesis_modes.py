@@ -35,7 +35,7 @@ def test_four_parallel_cables_swing_as_a_point_and_twist_as_a_plate():
 
 
 def test_two_cables_swing_about_the_line_of_their_hinges():
-    """Turning about the line through the body's hinges, at rest hinges, adds the double pendulum's two modes."""
+    """Across the line through the body's hinges it is a double pendulum, along it a single one."""
     mass, length, depth = 20.0, 1.5, 0.3
     J = 0.8
     modes = hanging(

@@ -1,4 +1,4 @@
-"""Figures in the order of the thesis: position, acceleration, rotational velocity of each case; case 5's map."""
+"""Figures in the order of the thesis: position, acceleration, rotational velocity of each case; maps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 #: Styles of the report's page, for a drawing that stands alone.
 STYLE = (
-    "<style>text{font:11.5px sans-serif;fill:#667080}.end{text-anchor:end}.mid{text-anchor:middle}path{fill:none}"
+    "<style>text{font:11.5px sans-serif;fill:#667080}.end{text-anchor:end}"
+    ".mid{text-anchor:middle}path{fill:none}"
     ".grid{stroke:#dfe3e8}.axis{stroke:#667080}.measured{stroke:#b4bdc8;stroke-width:26}"
     ".predicted{stroke:#1b5fa7;stroke-width:11}.residual{stroke:#b3261e;stroke-width:9}</style>"
 )

@@ -93,7 +93,7 @@ def number(value: float) -> str:
 
 
 def text_table(found: Rerun) -> str:
-    """The table for a terminal and for the README, in Markdown: (a) to (d) a line, all cases below each other."""
+    """The table in Markdown, for a terminal and for the README."""
     lines = [
         "| case | estimator | " + " | ".join(f"J{name}" for name in ELEMENTS) + " |",
         "| --- | --- |" + " ---: |" * len(ELEMENTS),

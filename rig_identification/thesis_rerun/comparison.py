@@ -1,4 +1,4 @@
-"""Four estimators on one case: (a) the thesis', (b) with the gyroscopic term, (c) momentum, (d) this project's."""
+"""Four estimators on a case: (a) the thesis', (b) with gyroscopic term, (c) momentum, (d) this project's."""
 
 from __future__ import annotations
 

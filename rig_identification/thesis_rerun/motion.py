@@ -13,6 +13,7 @@ right to fourth order in h.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +115,7 @@ def fly_case(case: Case, *, inertia: Array | None = None, duration: float | None
     force, held = np.zeros((nodes, 3)), np.zeros((nodes, 3))
     jumps = _jumps(case, nodes)
     edges = _edges(nodes, jumps)
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges):
         here = slice(first, last + 1)
         motion, plain, given = _block(case, model, state, first, last)
         held[first] = 0.5 * (held[first] + given[0]) if first in jumps else given[0]
@@ -145,7 +146,7 @@ def _edges(nodes: int, jumps: NDArray[np.int64]) -> list[int]:
     """First and last nodes of the blocks; none reaches across a jump."""
     outer = [0, *jumps.tolist(), nodes - 1]
     edges = [0]
-    for first, last in zip(outer[:-1], outer[1:], strict=True):
+    for first, last in pairwise(outer):
         count = max(1, round((last - first) / BLOCK))
         edges += np.rint(np.linspace(first, last, count + 1)).astype(int)[1:].tolist()
     return edges

@@ -24,7 +24,8 @@ def odd_statements(motion: CaseMotion, comparison: Comparison) -> tuple[str, ...
         found.append(reproduced)
     if motion.least_tension < 0.0:
         found.append(
-            f"A cable would have to push with {-motion.least_tension:.0f} N: the thesis' rods do, ropes would go slack."
+            f"A cable would have to push with {-motion.least_tension:.0f} N: the thesis' rods do, "
+            "ropes would go slack."
         )
     return tuple(found)
 
@@ -38,23 +39,28 @@ def given_back(motion: CaseMotion, comparison: Comparison) -> str | None:
     apart = np.abs(np.diag(ours - case.published.error))
     if np.max(apart) <= GIVEN_BACK:
         return f"(a) gives the published diagonal errors back within {np.max(apart):.2f} percentage points."
-    reason = REASONS.get(case.number, "")
-    return f"(a) misses the published diagonal errors by up to {np.max(apart):.2f} percentage points. {reason}".strip()
+    reason = REASONS.get(case.number, UNEXPLAINED)
+    miss = f"(a) misses the published diagonal errors by up to {np.max(apart):.2f} percentage points."
+    return f"{miss} {reason}"
 
 
 #: Why a published figure cannot be had from the published data, as far as it was found out.
 REASONS = {
     3: "With the force left out of the wrench the yaw equation holds too little for the one-step predictor; "
     "what it makes of Jzz depends on samples that are not published.",
-    4: "No force acts in the window, so that leaving it out changes nothing, and free motion determines every "
-    "element of noise-free samples; errors of 388 percent need samples other than these.",
-    8: "Released at rest from the printed pose the noise-free samples determine every element; the published errors "
-    "need another motion. The pose is case 7's at 1.2 s, where the body moves; its velocity is not printed.",
-    12: "At 2.1 Hz the error of one Euler step depends on the force's phase and plane, which the thesis does not print.",
-    15: "At 2.1 Hz the error of one Euler step depends on the force's phase and plane, which the thesis does not print.",
-    18: "Neither the phase of the force nor whether its plane turns with the body is printed; with the one convention "
-    "that gives case 14 back, this figure does not come.",
-}  # fmt: skip
+    4: "No force acts in the window, so that leaving it out changes nothing, and free motion determines "
+    "every element of noise-free samples; errors of 388 percent need samples other than these.",
+    8: "Released at rest from the printed pose the noise-free samples determine every element; the "
+    "published errors need another motion. The pose is case 7's at 1.2 s, where the body moves; its "
+    "velocity is not printed.",
+    18: "Neither the phase of the force nor whether its plane turns with the body is printed; with the one "
+    "convention that gives case 14 back, this figure does not come.",
+}
+#: The reason where no other was found.
+UNEXPLAINED = (
+    "No reason was found: neither the thesis' samples nor the phase and plane of its harmonic forces are "
+    "printed, and nothing here is chosen to match one case."
+)
 
 
 def _case_3(motion: CaseMotion) -> str:
@@ -70,10 +76,10 @@ def _case_6(motion: CaseMotion) -> str:
     ranges = [np.ptp(motion.center[part], axis=0) for part in (early, late)]
     return (
         "Nothing in the model takes energy away, so the body keeps swinging about the displaced equilibrium: "
-        f"the centre of mass covers {1e3 * ranges[0][0]:.0f} and {1e3 * ranges[0][1]:.0f} mm along x and y in the "
-        f"first 25 s of constant force, {1e3 * ranges[1][0]:.0f} and {1e3 * ranges[1][1]:.0f} mm in the last 25 s. "
-        "That is why the thesis identifies nothing here. The release at 75.1 s still sets it free from a known state, "
-        "and all four estimators work on what follows."
+        f"the centre of mass covers {1e3 * ranges[0][0]:.0f} and {1e3 * ranges[0][1]:.0f} mm along x and y "
+        f"in the first 25 s of constant force, {1e3 * ranges[1][0]:.0f} and {1e3 * ranges[1][1]:.0f} mm in "
+        "the last 25 s. That is why the thesis identifies nothing here. The release at 75.1 s still sets it "
+        "free, and all four estimators work on what follows."
     )
 
 
@@ -83,8 +89,8 @@ def _case_7(motion: CaseMotion) -> str:
     away = float(np.linalg.norm(motion.center[k] - np.array(quoted["center_of_gravity"])))
     turned = float(np.max(np.abs(motion.R_world_body[k].T - np.array(quoted["T"]))))
     return (
-        f"At {quoted['time']} s the centre of mass is {1e3 * away:.1f} mm from the quoted pose and T differs by at most "
-        f"{turned:.4f}. No identification is published."
+        f"At {quoted['time']} s the centre of mass is {1e3 * away:.1f} mm from the quoted pose and T differs "
+        f"by at most {turned:.4f}. No identification is published."
     )
 
 
@@ -96,7 +102,10 @@ def _case_8(motion: CaseMotion) -> str:
     center = np.array(quoted["center_of_gravity"])
     spans = center + (hinges - motion.case.center_of_mass) @ T - ceiling
     off = float(np.max(np.abs(np.linalg.norm(spans, axis=1) - quoted["cable_length"])))
-    return f"The quoted pose, its T taken as world into body, keeps all four cables at their length within {1e3 * off:.2f} mm."
+    return (
+        "The quoted pose, its T taken as world into body, keeps all four cables at their length within "
+        f"{1e3 * off:.2f} mm."
+    )
 
 
 def _case_12(motion: CaseMotion) -> str:
@@ -104,5 +113,6 @@ def _case_12(motion: CaseMotion) -> str:
     swapped = np.array(published["original"])
     return (
         "The thesis prints the identified and the true tensor in each other's place; exchanged back, Jxx "
-        f"{swapped[0, 0]:.1f} against {motion.case.inertia[0, 0]:.0f} kg m² is the printed {published['error'][0][0]} percent."
+        f"{swapped[0, 0]:.1f} against {motion.case.inertia[0, 0]:.0f} kg m² is the printed "
+        f"{published['error'][0][0]} percent."
     )

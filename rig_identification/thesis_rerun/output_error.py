@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.parameters import INERTIAL, DeviceLayout, ParameterSet
@@ -112,7 +111,7 @@ def nearest_body(guess: Array) -> Array:
 
 
 def solve_over_horizons(problem: Problem, point: Point) -> tuple[Evaluation, bool]:
-    """Fit over growing horizons; (evaluation over all that was reached, whether the whole window converged)."""
+    """Fit over growing horizons; (evaluation of what was reached, whether all converged)."""
     whole = max(run.grid.duration for run in problem.runs)
     roughly = replace(problem, weak=np.where(problem.weak > HELD, GROWING_WEAK, HELD))
     for end in (h for h in HORIZONS if h < 0.7 * whole):
@@ -134,9 +133,9 @@ def fit_tensor(
     """Fit the tensor to one window, s, from a first guess (3, 3) kg m^2, else from ``regression`` (3, 3)."""
     run = noise_free_run(motion, window)
     start = (state_at(motion, window[0]),)
-    for begun, first in (("guess", guess), ("momentum", regression)):
-        if first is None:
-            continue
+    guesses = {"guess": guess} | ({} if regression is None else {"momentum": regression})
+    for name, first in guesses.items():
+        begun = name
         problem, theta = tensor_problem(motion, (run,), first)
         evaluation, converged = solve_over_horizons(problem, Point(theta, start, ()))
         if converged:
@@ -146,5 +145,5 @@ def fit_tensor(
 
 
 def with_noise(case: Case) -> Case:
-    """The case with a rig description that states its sensors' noise, which weighs them; the force is exact."""
+    """The case with a rig description that states its sensors' noise as weights; the force is exact."""
     return replace(case, rig=replace(case.rig, noise=NOISE | {"exciter_force": 0.0}))

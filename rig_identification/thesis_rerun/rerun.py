@@ -75,7 +75,7 @@ def rerun_case(case: Case) -> CaseResult:
     comparison = compare(motion)
     unknown = None
     if not case.force_measured:
-        unknown = fit_with_unknown_force(motion, case.window, case.initial_guess)
+        unknown = fit_with_unknown_force(motion, case.window)
     windows = convergence_map(motion, comparison.momentum.inertia) if case.number == MAPPED else None
     return CaseResult(
         case,

@@ -7,7 +7,7 @@ rest and geometry and takes its body from the momentum regression (estimate/laun
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,14 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
+from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.identify import pose_problem
-from rig_identification.estimate.launch import Launch, tracked
+from rig_identification.estimate.launch import SHARE, Launch, launch_state
 from rig_identification.estimate.prediction import model_at, start_basis
-from rig_identification.estimate.track import BLOCK, Track
+from rig_identification.estimate.track import BLOCK, Track, start_covariance, track, wrench_noise
 from rig_identification.live import strapdown
 from rig_identification.model.motion import RigModel, State
-from rig_identification.recording import Recording, Session, Series
+from rig_identification.recording import Recording, Series, Session
 from rig_identification.simulate import case_spec, simulate_session
 from rig_identification.thesis.case import Case
 
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 
 #: Compared so often, s.
 EVERY = 0.1
+#: What the launch's start is trusted to (m and rad; m/s and rad/s), and the motion that betters it, s.
+START_SPREAD, BETTERED = (0.1, 0.2), 2.0
 
 
 @dataclass(frozen=True)
@@ -115,12 +118,28 @@ def compare_tracking(case: Case, duration: float, seed: int) -> TrackingComparis
 
 
 def _tracked(session: Session) -> tuple[Track, RigModel] | None:
+    """Motion by the project's tracker, whose body and start are its own guesses, on rods as in the thesis."""
     problem, theta, _ = pose_problem(session)
-    launch = Launch(problem, theta).from_rest().from_momentum()
+    parameters = problem.bench.parameters
+    rods = replace(parameters.model, can_slacken=np.zeros(parameters.model.cables, dtype=bool))
+    bench = replace(problem.bench, parameters=replace(parameters, model=rods))
+    launch = Launch(replace(problem, bench=bench), theta).from_rest().from_momentum()
+    run = problem.runs[0]
     if launch.rest is None:
         return None
-    track = tracked(problem.bench, problem.runs[0], launch.theta, launch.rest)
-    return None if track is None else (track, model_at(problem.bench.parameters, launch.theta))
+    mass = bench.parameters.elements(launch.theta)[0]
+    size = float(np.max(extent(session.rig)))
+    noise = wrench_noise(float(mass), session.rig.gravity, size, run.grid.step, SHARE)
+    start = launch_state(bench, run, launch.theta, launch.rest, noise)
+    spread = start_covariance(*START_SPREAD)
+    for _ in range(2):
+        # Smoothed over its first block the start is far better than the launch's: linearise about that
+        early = track(bench, run.until(BETTERED), launch.theta, start, spread, noise)
+        if early is None:
+            return None
+        start = early.state(0)
+    found = track(bench, run, launch.theta, start, spread, noise)
+    return None if found is None else (found, model_at(bench.parameters, launch.theta))
 
 
 def _held_error(

@@ -47,16 +47,16 @@ class ConvergenceMap:
     output_error_std: Array  # (w, 3, 3) kg m^2, of (d) under the sensors' noise
 
 
-def convergence_map(motion: CaseMotion, near: Array) -> ConvergenceMap:
-    """Every window of case 5. near (3, 3) kg m^2: tensor about which (d) is linearised."""
+def convergence_map(motion: CaseMotion, near: Array, every: int = 1) -> ConvergenceMap:
+    """Windows of case 5, one in ``every``. near (3, 3) kg m^2: tensor about which (d) is linearised."""
     case = motion.case
     rate, moment = measured(motion, motion.samples())
     found, converged = [], []
-    for first in range(WINDOWS):
+    for first in range(0, WINDOWS, every):
         fit = fit_euler_predictor(rate[first:], moment[first:], case.sampling, case.initial_guess)
         found.append(fit.inertia)
         converged.append(fit.converged)
-    start = case.sampling * np.arange(WINDOWS)
+    start = case.sampling * np.arange(0, WINDOWS, every)
     tensors, stds = _output_error(motion, near, start)
     return ConvergenceMap(start, np.array(found), np.array(converged), tensors, stds)
 

@@ -1,8 +1,8 @@
 """Run the thesis' case studies again and set its published errors beside four estimators.
 
-Writes DIR/thesis.json, DIR/report.html and an SVG for each figure, all or none. Each case is simulated without
-noise; (a) is the thesis' own estimator, (b) has the gyroscopic term, (c) is a regression on momentum, and (d) is
-this package's estimator, with its standard deviation under realistic noise.
+Writes DIR/thesis.json, DIR/report.html and an SVG for each figure, all or none. Each case is simulated
+without noise; (a) is the thesis' own estimator, (b) has the gyroscopic term, (c) is a regression on momentum,
+and (d) is this package's estimator, with its standard deviation under realistic noise.
 
   rig-identification thesis --out thesis
   rig-identification thesis --case 14 --case 18b --out civic
