@@ -51,6 +51,11 @@ def add_hinge_moments(physics, modes, x, R, viscous, rubbing, r):  # type: ignor
         sz = (vz + wx * by - wy * bx) * per_length
         ox, oy, oz = ey * sz - ez * sy, ez * sx - ex * sz, ex * sy - ey * sx
         ax, ay, az = wx - ox, wy - oy, wz - oz
+        # A massless cable cannot hold a moment about itself: it spins at half the body's twist, so that
+        # its two hinges, alike, pass on the same moment
+        half = 0.5 * (ex * ax + ey * ay + ez * az)
+        ax, ay, az = ax - half * ex, ay - half * ey, az - half * ez
+        ox, oy, oz = ox + half * ex, oy + half * ey, oz + half * ez
         lower = _law(viscous, rubbing, ax, ay, az)
         upper = _law(viscous, rubbing, ox, oy, oz)
         # Net moment on the cable, then the force across it at the body's hinge
