@@ -33,6 +33,10 @@ FITTED = 4
 MOST_EFFECTS = 3
 #: A promise this much (nats) behind the best is not worth a fit, in parts of the best.
 WORTH = 0.05
+#: Mean square of whitened residuals below which nothing much is left, and the share of the best promise
+#: that makes a rival of it even so.
+AT_NOISE = 1.05
+RIVAL = 0.9
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,12 @@ def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool
     return any(abs(values[p.name] - p.nominal) > limit * ordinary[p.name] for p in freed)
 
 
+def _at_noise(trial: Trial) -> bool:
+    """Whether a hypothesis leaves residuals of the size of the noise."""
+    residuals = np.concatenate([run.residual for run in trial.evaluation.runs])
+    return float(np.mean(residuals**2)) < AT_NOISE
+
+
 def trials(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate], limit: float, notify: Notify
 ) -> list[Trial]:
@@ -119,6 +129,8 @@ def trials(
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
     done: list[Trial] = []
     for promise in [p for p in worthy if p.gain > WORTH * worthy[0].gain][:FITTED]:
+        if any(_at_noise(t) for t in done) and promise.gain < RIVAL * worthy[0].gain:
+            break
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise)
         if trial is not None and beyond_doubt(trial, ordinary, limit):

@@ -2,9 +2,9 @@
 
 A cable along e (ceiling to body) turns at O = e x s / l, s being the velocity of its lower hinge,
 and spins about itself at half the body's twist e.w: being massless it passes the same moment
-about itself through both hinges. With that spin in O, the body's hinge puts -c (w - O) on the body and the reverse on the cable,
-the ceiling's -c O on the cable. A massless cable under a net moment M is held by forces across
-it, which put F = -e x M / l on the body at the hinge.
+about itself through both hinges. With that spin in O, the body's hinge puts -c (w - O) on the
+body and the reverse on the cable, the ceiling's puts -c O on the cable. A massless cable
+under a net moment M is held by forces across it, which put F = -e x M / l on the body.
 """
 
 from __future__ import annotations
