@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.prediction import exciter_wrench_map, smoothed
+from rig_identification.estimate.sampling import Grid, group_by_node
 from rig_identification.estimate.solve import Point, solve
 from rig_identification.live.generalized_wrench import generalized_wrench
 from rig_identification.model.body import tensor
 from rig_identification.model.motion import on_cables
 from rig_identification.thesis.estimators import fit_momentum
-from rig_identification.thesis_rerun.motion import STEP, CaseMotion
+from rig_identification.thesis_rerun.motion import CaseMotion
 from rig_identification.thesis_rerun.output_error import (
     nearest_body,
     noise_free_run,
@@ -57,15 +59,13 @@ class UnknownForceFit:
 def fit_with_unknown_force(motion: CaseMotion, window: tuple[float, float]) -> UnknownForceFit:
     """Fit tensor and force to a window, s. No guess is needed."""
     case = motion.case
-    run = replace(noise_free_run(motion, window, force=False), exciter=None, exciter_noise=0.0)
+    run = _at_sampling_rate(noise_free_run(motion, window, force=False), case.sampling)
     felt, rough = _felt_force(motion, window)
     problem, theta = tensor_problem(motion, (run,), nearest_body(rough))
     parameters = problem.bench.parameters
     spread = exciter_wrench_map(parameters, theta)
     problem = replace(problem, extra_noise=FORCE_STD**2 * spread @ spread.T)
-    grid = STEP * np.arange(run.grid.nodes)
-    at_samples = case.sampling * np.arange(len(felt))
-    latent = _held(np.stack([np.interp(grid, at_samples, column) for column in felt.T], axis=1)) @ spread.T
+    latent = _held(felt[: run.grid.nodes]) @ spread.T
     point = Point(theta, (state_at(motion, window[0]),), (), (latent,))
     before, converged, rounds = rough, False, 0
     while rounds < ROUNDS and not converged:
@@ -78,9 +78,19 @@ def fit_with_unknown_force(motion: CaseMotion, window: tuple[float, float]) -> U
         starts = tuple(on_cables(motion.model, s) for s in evaluation.point.starts)
         point = replace(evaluation.point, starts=starts, latents=(latent,))
     force = np.linalg.lstsq(spread, latent.T, rcond=None)[0].T
-    first = round(window[0] / STEP)
-    true = _held(motion.held_force[first : first + run.grid.nodes])
-    return UnknownForceFit(found, converged, rounds, grid, force, true)
+    true = _held(motion.force[motion.samples(window)][: run.grid.nodes])
+    time = run.grid.step * np.arange(run.grid.nodes)
+    return UnknownForceFit(found, converged, rounds, time, force, true)
+
+
+def _at_sampling_rate(run: Run, sampling: float) -> Run:
+    """The run on nodes as far apart as its samples: a force between two of them has one value."""
+    grid = Grid(sampling, round(run.grid.duration / sampling) + 1)
+    channels = []
+    for channel in run.channels:
+        group, node = group_by_node(grid, channel.time)
+        channels.append(replace(channel, group=group, node=node))
+    return replace(run, grid=grid, channels=tuple(channels), exciter=None, exciter_noise=0.0)
 
 
 def _felt_force(motion: CaseMotion, window: tuple[float, float]) -> tuple[Array, Array]:
