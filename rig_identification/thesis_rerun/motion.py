@@ -125,7 +125,7 @@ def fly_case(case: Case, *, inertia: Array | None = None, duration: float | None
     return CaseMotion(
         case,
         model,
-        STEP * np.arange(nodes),
+        STEP * np.arange(nodes, dtype=float),
         states[:, :3],
         rotations,
         states[:, 6:9],

@@ -132,7 +132,7 @@ def _work(job: tuple[int, str]):  # type: ignore[no-untyped-def]
     )
 
 
-def _side_by_side(  # type: ignore[no-untyped-def]
+def _side_by_side(
     jobs: list[tuple[int, str]], tracking: bool, workers: int, progress: Progress
 ) -> Iterator[tuple[tuple[int, str], CaseResult]]:
     # The long ones first, so that no process ends up alone with one of them

@@ -79,7 +79,7 @@ def fit_with_unknown_force(motion: CaseMotion, window: tuple[float, float]) -> U
         point = replace(evaluation.point, starts=starts, latents=(latent,))
     force = np.linalg.lstsq(spread, latent.T, rcond=None)[0].T
     true = _held(motion.force[motion.samples(window)][: run.grid.nodes])
-    time = run.grid.step * np.arange(run.grid.nodes)
+    time = run.grid.step * np.arange(run.grid.nodes, dtype=float)
     return UnknownForceFit(found, converged, rounds, time, force, true)
 
 

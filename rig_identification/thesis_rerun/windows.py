@@ -56,7 +56,7 @@ def convergence_map(motion: CaseMotion, near: Array, every: int = 1) -> Converge
         fit = fit_euler_predictor(rate[first:], moment[first:], case.sampling, case.initial_guess)
         found.append(fit.inertia)
         converged.append(fit.converged)
-    start = case.sampling * np.arange(0, WINDOWS, every)
+    start = case.sampling * np.arange(0, WINDOWS, every, dtype=float)
     tensors, stds = _output_error(motion, near, start)
     return ConvergenceMap(start, np.array(found), np.array(converged), tensors, stds)
 
