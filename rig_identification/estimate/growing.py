@@ -65,6 +65,8 @@ def solve_growing(
                 weak=HOLD * problem.weak,
                 stride=problem.stride / HOLD,
             )
+        # The start states alone first: their error is the largest, and everything else would bend to it
+        point = replace(point, starts=settled_starts(part, point))
         # A short horizon needs no polish: the next one moves everything again
         evaluation, converged = solve(
             part,
@@ -75,6 +77,15 @@ def solve_growing(
         )
         point = evaluation.point
     return evaluation, converged
+
+
+def settled_starts(problem: Problem, point: Point) -> tuple[State, ...]:
+    """Start states that fit best with everything else as it is at ``point``."""
+    starts = []
+    for run, start in zip(problem.runs, point.starts, strict=True):
+        found = fit_start(problem.bench, run, point.theta, start, tolerance=0.1)
+        starts.append(start if found is None else found[1])
+    return tuple(starts)
 
 
 def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tuple[Linearised, State] | None:

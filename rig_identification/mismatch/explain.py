@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rig_identification.estimate.growing import fit_start_growing
 from rig_identification.estimate.identify import ORDINARY, Fitted, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
@@ -105,7 +107,9 @@ def _mismatch(ideal: Fitted, fitted: Fitted, found: list[Trial], rivals: list[di
     judged = judge(fitted, parameters, after.holdout, after.training, ORDINARY)
     gain = ideal.evaluation.cost - fitted.evaluation.cost
     values = {p.name: p.value for p in parameters}
-    stds = {p.name: p.std for p in parameters}
+    # An error beyond what is ordinary comes on top of an ordinary one, and only their sum is seen
+    ordinary = {p.name: p.prior_std for p in ideal.problem.bench.parameters.free}
+    stds = {p.name: float(np.hypot(p.std, ordinary.get(p.name, 0.0))) for p in parameters}
     findings = tuple(_finding(t, values, stds, gain, before.holdout, after.holdout) for t in found)
     named = ", ".join(f.effect for f in findings)
     if judged.verdict == "none":
