@@ -41,9 +41,9 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
             seen.update(options, path=path)
             return session
 
-        module = types.ModuleType("rig_identification.estimate")
+        module = types.ModuleType("rig_identification.mismatch")
         module.identify = identify  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "rig_identification.estimate", module)
+        monkeypatch.setitem(sys.modules, "rig_identification.mismatch", module)
         monkeypatch.setattr("rig_identification.session.read_session", read_session)
 
     install.seen = seen  # type: ignore[attr-defined]

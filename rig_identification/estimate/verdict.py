@@ -104,7 +104,7 @@ def judge(
         if (holdout_error is not None)
         else f"Fitted error {training_error:.3g} (1 is a perfect model); no held-out run."
     )
-    judged = "Judged by the residuals alone; no missing physics was searched for."
+    judged = "Judged by the residuals alone."
     if reasons:
         return Mismatch("unexplained", f"{'; '.join(reasons).capitalize()}. {scores} {judged}")
     return Mismatch("none", f"Every residual is noise within its sensor's own. {scores} {judged}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from rig_identification.estimate.identify import compose, fit_ideal, scores
 from rig_identification.mismatch.explain import explain
 from rig_identification.recording import Session
@@ -33,12 +35,16 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     if not ideal.fitted.problem.runs:
         return plain
     careful = None if ideal.careful is None else ideal.careful[1]
-    found = explain(
-        ideal.fitted,
-        ideal.mismatch,
-        careful,
-        lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
-    )
+    try:
+        found = explain(
+            ideal.fitted,
+            ideal.mismatch,
+            careful,
+            lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
+        )
+    except (FloatingPointError, np.linalg.LinAlgError) as error:
+        note = f"The search for what the model leaves out ended early ({error}); the ideal model's answer stands."
+        return replace(plain, notes=(*plain.notes, note))
     if found is None:
         return plain
     unexplained = found.mismatch.verdict == "unexplained"

@@ -49,11 +49,6 @@ from rig_identification.model.layout import (
     VELOCITY,
 )
 
-#: Softness of a rigid cable at acceleration level, m/s^2 per N. It moves nothing that can be measured
-#: (3e-7 m/s^2 under 3 kN, and lengths are restored at each step); where more cables than needed hold
-#: the body still, it makes their shares of the load the smallest ones instead of undefined.
-COMPLIANCE = 1e-10
-
 
 @njit(cache=True)
 def rotation(reference, x, out):  # type: ignore[no-untyped-def]
@@ -198,7 +193,8 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
             K[row, 3] = -mx
             K[row, 4] = -my
             K[row, 5] = -mz
-            K[row, row] = -COMPLIANCE
+            # Softness at acceleration level: zero but where more cables than needed hold the body
+            K[row, row] = -physics[physics.shape[0] - 1]
             r[row] = (
                 ux * (wy * ez - wz * ey)
                 + uy * (wz * ex - wx * ez)

@@ -37,6 +37,27 @@ class RigModel:
         return replace(self, physics=np.ascontiguousarray(physics, dtype=float))
 
 
+#: Softness (m/s^2 per N) of rigid cables of which more than needed hold the body. It moves nothing that can
+#: be measured (3e-7 m/s^2 under 3 kN; lengths are restored at each step) and makes their shares
+#: of the load the smallest ones instead of undefined.
+SOFTNESS = 1e-10
+
+
+def redundant(rig: Rig) -> bool:
+    """Whether more cables hold the body than it takes: lines of force dependent near the design pose."""
+    ceiling = np.array([c.ceiling_point for c in rig.cables])
+    body = np.array([c.body_point for c in rig.cables])
+    drop = [0.0, 0.0, float(np.mean([c.length for c in rig.cables]))]
+    along = ceiling - body - np.mean(ceiling - body, axis=0) + drop
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    arm = body - np.mean(body, axis=0)
+    lines = np.concatenate([along, np.cross(arm / max(float(np.max(np.abs(arm))), 1e-9), along)], axis=1)
+    if lines.shape[0] > 6:
+        return True
+    strengths = np.linalg.svd(lines, compute_uv=False)
+    return bool(strengths[-1] < 1e-3 * strengths[0])
+
+
 def rig_model(
     rig: Rig, elements: Array, *, axial_stiffness: float | None = None, rods: bool = False
 ) -> RigModel:
@@ -61,6 +82,7 @@ def rig_model(
         physics[o + layout.LENGTH] = cable.length
         physics[o + layout.CELL_AT_CEILING] = float(cable.load_cell == "ceiling")
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
+    physics[-1] = SOFTNESS if redundant(rig) else 0.0
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic
     return RigModel(

@@ -67,7 +67,7 @@ def _read(path: Path, namespace: str, topics: dict[str, str], progress: StagePro
 
 
 def _identify(session: Session, progress: StageProgress) -> Identification:
-    from rig_identification.estimate import identify
+    from rig_identification.mismatch import identify
 
     return identify(session, progress=progress)
 

@@ -20,7 +20,8 @@ TETHER_PULL = 9  # 3: N, world axes
 TETHER_POINT = 12  # 3: m, body
 REFERENCE_POSITION = 15  # 3: m, world
 REFERENCE_ROTATION = 18  # 9: rotation matrix, row by row
-EFFECTS_SIZE = 27
+SHARING = 27  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+EFFECTS_SIZE = 28
 
 
 def effects_block(cables: int) -> int:
