@@ -43,7 +43,7 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
             lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
         )
     except (FloatingPointError, np.linalg.LinAlgError) as error:
-        note = f"The search for what the model leaves out ended early ({error}); the ideal model's answer stands."
+        note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
         return replace(plain, notes=(*plain.notes, note))
     if found is None:
         return plain
