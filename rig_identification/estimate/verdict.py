@@ -47,7 +47,7 @@ def residual_witnesses(run: Run, linearised: Linearised, residual: Array) -> lis
     return out
 
 
-def predictive_residual(fitted: Fitted, linearised: Linearised, full: Linearised) -> Array:
+def predictive_residual(fitted: Fitted, full: Linearised) -> Array:
     """Held-out innovations less what the parameters' own uncertainty accounts for.
 
     The fit's posterior N(theta, information^-1) is carried into the held-out run: the
@@ -62,7 +62,6 @@ def predictive_residual(fitted: Fitted, linearised: Linearised, full: Linearised
     normal = full.jacobian.T @ full.jacobian
     normal[:p, :p] += shared
     step = np.linalg.lstsq(normal, full.jacobian.T @ full.residual, rcond=1e-14)[0]
-    _ = linearised
     return np.asarray(full.residual - full.jacobian @ step)
 
 
@@ -81,7 +80,7 @@ def judge(
         start = linearised.motion.state(0)
         full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
         if full is not None:
-            witnesses += residual_witnesses(run, full, predictive_residual(fitted, linearised, full))
+            witnesses += residual_witnesses(run, full, predictive_residual(fitted, full))
     beyond = [p for p in parameters if abs(p.value - p.nominal) >= ordinary * p.prior_std * (1.0 - 1e-6)]
     reasons = []
     if witnesses:

@@ -76,7 +76,6 @@ def screen(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
     if full is None:
         return []
     free = wide.bench.parameters.free
-    p = wide.bench.parameters.size
     added = {q.name for q in free} - {q.name for q in problem.bench.parameters.free}
     column = {q.name: INERTIAL + i for i, q in enumerate(free)}
     theta = point.theta
@@ -111,7 +110,6 @@ def screen(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
             for name, own in scale.items()
         }
         out.append(Promise(candidate, gain, values))
-    _ = p
     return sorted(out, key=lambda promise: -promise.gain)
 
 

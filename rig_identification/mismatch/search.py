@@ -67,14 +67,13 @@ def needed_gain(candidate: Candidate, count: int) -> float:
     return 0.5 * float(chi2.isf(FALSE_ALARM / count, len(candidate.parameters)))
 
 
-def log_evidence(evaluation: Evaluation, parameters: int) -> float:
+def log_evidence(evaluation: Evaluation) -> float:
     """Laplace: log posterior at its peak, less half the log of how much sharper it is than the prior.
 
     Start states have flat priors and count alike in every hypothesis; their share cancels
     but for its correlation, which the determinant keeps.
     """
     sign, log_det = np.linalg.slogdet(evaluation.information)
-    _ = parameters
     return -evaluation.cost - 0.5 * float(log_det) if sign > 0 else -np.inf
 
 
@@ -97,7 +96,7 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
         i = wide.bench.parameters.index_of(candidate.parameters[0].name)
         if fitted.point.theta[i] <= 0.0:
             return None
-    return Trial(candidate, wide, fitted, log_evidence(fitted, wide.bench.parameters.size))
+    return Trial(candidate, wide, fitted, log_evidence(fitted))
 
 
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
