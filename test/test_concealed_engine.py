@@ -22,6 +22,7 @@ from bench.concealed.effects import CATALOGUE, OUTSIDE
 from bench.concealed.effects.base import State
 from bench.concealed.effects.cable_elasticity import CableElasticity
 from bench.concealed.effects.cable_mass import CableMass
+from bench.concealed.effects.hinge import HingeMoments
 from bench.concealed.effects.hinge_damping import HingeDamping
 from bench.concealed.effects.liquid_slosh import LiquidSlosh
 from bench.concealed.effects.load_cell_gain import LoadCellGain
@@ -196,7 +197,7 @@ def test_hinge_damping_takes_what_its_hinges_turn() -> None:
     law = effect.bind(scene)
     for k in range(0, len(path.time), 50):
         motion = (path.position[k], rotation[k])
-        top, bottom = hinge_rates(*place, *motion, path.velocity[k], path.rate[k])
+        top, bottom = hinge_rates(*place, *motion, path.velocity[k], path.rate[k], 0.5)
         formula.append(-5.0 * float((top**2).sum() + (bottom**2).sum()))
         applied = law(State("run_1", path.time[k], *motion, path.velocity[k], path.rate[k]))
         power.append(float(applied[:3] @ path.velocity[k] + applied[3:] @ path.rate[k]))
@@ -204,6 +205,31 @@ def test_hinge_damping_takes_what_its_hinges_turn() -> None:
     energy, _ = _energy(scene, path)
     lost = energy[-1] - energy[0] - _work(scene, path)[-1]
     assert lost == pytest.approx(np.mean(formula) * path.time[-1], rel=0.02)
+
+
+def test_pure_twist_meets_two_hinge_dampers_in_series() -> None:
+    scene = draw_scene(21, 5.0)
+    geometry = replace(scene.geometry, hinge=np.zeros((3, 3)), ceiling=np.tile([0.0, 0.0, 2.0], (3, 1)))
+    twist = State("run_1", 0.0, np.zeros(3), np.eye(3), np.zeros(3), np.array([0.0, 0.0, 0.4]))
+    both = HingeDamping(6.0).bind(replace(scene, geometry=geometry))(twist)
+    # Each cable: 6 and 6 N m s/rad one after the other make 3.
+    np.testing.assert_allclose(both, [0.0, 0.0, 0.0, 0.0, 0.0, -3 * 3.0 * 0.4], atol=1e-12)
+    # With a free hinge at the ceiling the cable turns with the body and resists nothing.
+    lower = HingeMoments(geometry, lambda rate: -6.0 * rate, at_ceiling=False)(twist)
+    np.testing.assert_allclose(lower, 0.0, atol=1e-12)
+
+
+def test_each_hinge_sees_half_the_twist() -> None:
+    scene = draw_scene(1, 6.0)
+    place = (scene.geometry.ceiling, scene.geometry.hinge, np.array([0.01, 0.02, -1.9]), np.eye(3))
+    rng = np.random.default_rng(5)
+    for velocity, rate in rng.normal(0.0, 0.1, (5, 2, 3)):
+        top, bottom = hinge_rates(*place, velocity, rate, 0.5)
+        span = place[2] + place[1] - place[0]
+        along = span / np.linalg.norm(span, axis=1)[:, None]
+        np.testing.assert_allclose((top * along).sum(axis=1), 0.5 * along @ rate)
+        np.testing.assert_allclose((bottom * along).sum(axis=1), 0.5 * along @ rate)
+        np.testing.assert_allclose(top + bottom, np.tile(rate, (len(span), 1)))
 
 
 def test_elastic_cables_stretch_by_tension_over_stiffness() -> None:

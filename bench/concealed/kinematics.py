@@ -60,11 +60,18 @@ def put_body_force(applied: Array, rotation: Array, force_body: Array, point_bod
 
 @njit(cache=True)
 def hinge_rates(
-    ceiling: Array, hinge: Array, position: Array, rotation: Array, velocity: Array, rate: Array
+    ceiling: Array,
+    hinge: Array,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    rate: Array,
+    follow: float,
 ) -> tuple[Array, Array]:
     """By cable: angular rate of the cable (n, 3), and of the body against it (n, 3).
 
-    World axes. The cable does not spin about itself: its rate is u x du/dt.
+    World axes. Swinging turns the cable at u x du/dt; besides, it spins about itself at ``follow`` times
+    the body's rate about it: half where both hinges resist alike, 1 where the one at the ceiling is free.
     """
     count = ceiling.shape[0]
     top, bottom = np.empty((count, 3)), np.empty((count, 3))
@@ -73,7 +80,8 @@ def hinge_rates(
         arm = rotation @ hinge[i]
         span = position + arm - ceiling[i]
         speed = velocity + np.cross(spin, arm)
-        top[i] = np.cross(span, speed) / np.dot(span, span)
+        twist = np.dot(span, spin) / np.dot(span, span)
+        top[i] = np.cross(span, speed) / np.dot(span, span) + follow * twist * span
         bottom[i] = spin - top[i]
     return top, bottom
 

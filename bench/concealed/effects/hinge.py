@@ -12,7 +12,11 @@ from bench.concealed.scene import Array, Geometry
 
 
 class HingeMoments:
-    """Force on the body of moments at the hinges of massless cables that do not spin."""
+    """Force on the body of moments at the hinges of massless cables.
+
+    A massless cable passes the moment about its own axis on: it spins at half the body's twist where both
+    hinges follow the same law, and with the body where only the one at the body resists.
+    """
 
     def __init__(self, geometry: Geometry, law: Callable[[Array], Array], at_ceiling: bool = True) -> None:
         """``law`` gives moments (cables, 3) in N m on what turns at relative rates (cables, 3) in rad/s."""
@@ -23,6 +27,7 @@ class HingeMoments:
     def __call__(self, state: State) -> Array:
         """(6,) generalised force, as :meth:`Effect.force`."""
         place = (self._ceiling, self._hinge, state.position, state.rotation)
-        top, bottom = hinge_rates(*place, state.velocity, state.rate)
+        follow = 0.5 if self._at_ceiling else 1.0
+        top, bottom = hinge_rates(*place, state.velocity, state.rate, follow)
         on_cable = self._law(top) if self._at_ceiling else np.zeros_like(top)
         return np.asarray(hinge_moments_on_body(*place, on_cable, self._law(bottom)))

@@ -14,7 +14,7 @@ from bench.concealed.scene import Scene
 
 @dataclass(frozen=True)
 class HingeDamping(Effect):
-    """At both hinges of every cable, against the relative rotation there; the cable does not spin."""
+    """At both hinges of every cable, against the relative rotation there; a cable spins at half the twist."""
 
     name = "hinge_damping"
     mechanical = True
