@@ -54,13 +54,19 @@ def seal(
 ) -> str:
     """Write the truths of all sessions to ``path``; return its SHA-256 in hex.
 
-    ``sessions``: a folder to write the sessions themselves to, each without its truth.
+    ``sessions``: a folder to write the sessions themselves to, each without its truth. One that the
+    engine cannot make is left out; its entry says why.
     """
     entries = []
     for k, entry in enumerate(compose(seeds, salt)):
-        session, truth = make_session(
-            entry["seed"], kind=entry["kind"], size=entry["size"], duration=duration
-        )
+        try:
+            session, truth = make_session(
+                entry["seed"], kind=entry["kind"], size=entry["size"], duration=duration
+            )
+        except RuntimeError as error:  # this body with this effect cannot be run: one session less
+            entries.append({**entry, "duration": duration, "truth": None, "failed": str(error)})
+            print(f"{k + 1} of {len(seeds)}: left out", file=sys.stderr)
+            continue
         entries.append({**entry, "duration": duration, "truth": truth})
         if sessions is not None:
             from rig_identification.session import write_session
