@@ -51,6 +51,18 @@ def test_result_has_the_contracts_keys(identification: Identification, explained
     assert finding["where"]["axis"] is None
 
 
+def test_result_tells_what_the_ideal_model_said(
+    identification: Identification, explained: Identification
+) -> None:
+    both = result_to_dict(replace(explained, figures={"ideal": identification}))
+    ideal = both["mismatch"]["ideal_model"]
+    assert list(ideal) == ["mass", "center_of_mass", "inertia", "unobservable"]
+    np.testing.assert_array_equal(ideal["inertia"]["value"], inertia_matrix(identification.total.values))
+    assert ideal["unobservable"] == []
+    assert both["inertia"]["value"][2][2] is None
+    assert "ideal_model" not in result_to_dict(identification)["mismatch"]
+
+
 def test_result_carries_the_numbers(identification: Identification) -> None:
     result = result_to_dict(identification)
     values, std = identification.total.values, np.sqrt(np.diag(identification.total.covariance))

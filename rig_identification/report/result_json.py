@@ -21,9 +21,11 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
     Returns
     -------
     dict
-        Exactly the contract's keys. Elements named in ``unobservable`` are None, with their standard
+        The contract's keys. Elements named in ``unobservable`` are None, with their standard
         deviations and their rows and columns of the covariance.
-        ``without_frame`` is None where no frame was described.
+        ``without_frame`` is None where no frame was described. Where effects were found,
+        ``mismatch`` holds one key more, ``ideal_model``: mass, centre of mass, inertia and what is
+        unobservable as the ideal model alone has them.
     """
     total = identification.total
     without_frame = identification.without_frame
@@ -32,7 +34,10 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         "covariance": _masked(total.covariance, _observable(total)),
         "without_frame": None if without_frame is None else _estimate(without_frame),
         "unobservable": list(total.unobservable),
-        "mismatch": _mismatch(identification.mismatch),
+        "mismatch": {
+            **_mismatch(identification.mismatch),
+            **_ideal_model(identification.figures.get("ideal")),
+        },
     }
 
 
@@ -81,6 +86,13 @@ def _mismatch(mismatch: Mismatch) -> dict[str, object]:
         ],
         "alternatives": _plain(mismatch.alternatives),
     }
+
+
+def _ideal_model(ideal: object) -> dict[str, object]:
+    """What the ideal model answered before effects were found; nothing where it is the answer itself."""
+    if not isinstance(ideal, Identification):
+        return {}
+    return {"ideal_model": {**_estimate(ideal.total), "unobservable": list(ideal.total.unobservable)}}
 
 
 def _numbers(values: NDArray[np.float64]) -> list[float | None]:
