@@ -239,7 +239,9 @@ def test_channel_axis_end_times_and_position(answer: Callable[..., Answer]) -> N
     close = mark("a", truth, answer(finding("external_force", **push(3.9, 4.5))))
     assert close.places == {"times": True}
     assert close.position_error == 0.0
-    assert mark("a", truth, answer(finding("external_force", **push(4.1, 4.5)))).places == {"times": False}
+    for elsewhere in ((4.1, 4.5), (1.0, 2.9)):
+        said = finding("external_force", **push(*elsewhere))
+        assert mark("a", truth, answer(said)).places == {"times": False}
     assert mark("a", truth, answer(finding("external_force"))).places == {"times": False}
 
 
@@ -331,6 +333,14 @@ def test_held_out_error_and_medians(answer: Callable[..., Answer]) -> None:
     assert by_label["held-out error after"].median == 1.1
     assert by_label["held-out error after"].worst == 1.3
     assert by_label["J error before, worst element in claimed sigma"].median == 10.0
+
+
+def test_held_out_error_goes_from_before_the_first_finding_to_after_the_last(
+    answer: Callable[..., Answer],
+) -> None:
+    both = answer(finding("tether", held=(9.0, 3.0)), finding("imu_bias", held=(3.0, 1.0)))
+    assert (both.holdout_before, both.holdout_after) == (9.0, 1.0)
+    assert answer(verdict="none").holdout_after is None
 
 
 def test_named_answers_to_outside_effects_are_counted_strictly(answer: Callable[..., Answer]) -> None:

@@ -61,9 +61,18 @@ class Answer:
         """The first finding of that effect."""
         return next((f for f in self.findings if f["effect"] == effect), None)
 
-    def evidence(self, name: str) -> float | None:
-        """A number of the last finding's evidence: the model with all findings in it."""
-        value = self.findings[-1].get("evidence", {}).get(name) if self.findings else None
+    @property
+    def holdout_before(self) -> float | None:
+        """Held-out error before the first finding."""
+        return self._evidence(0, "holdout_error_before")
+
+    @property
+    def holdout_after(self) -> float | None:
+        """Held-out error with all findings in the model."""
+        return self._evidence(-1, "holdout_error_after")
+
+    def _evidence(self, place: int, name: str) -> float | None:
+        value = self.findings[place].get("evidence", {}).get(name) if self.findings else None
         return None if value is None else float(value)
 
     @property

@@ -118,11 +118,11 @@ class Engine:
     def _newton(self, hold: float) -> float:
         """Newton's method from here; go back if it leads nowhere. Return the acceleration left."""
         best = self.data.qpos.copy()
-        start = least = np.linalg.norm(self._acceleration_at_rest(best, hold))
+        start = least = float(np.linalg.norm(self._acceleration_at_rest(best, hold)))
         for _ in range(12):
             pose = self.data.qpos.copy()
             residual = self._acceleration_at_rest(pose, hold)
-            size = np.linalg.norm(residual)
+            size = float(np.linalg.norm(residual))
             if size <= least:
                 best, least = pose, size
             if size < 1e-8 or size > 1e4 * max(start, 1.0):
@@ -155,7 +155,7 @@ class Engine:
         self.data.qacc[:] = 0.0
         self.load(-1.0, np.zeros(3), hold=hold)
         mujoco.mj_forward(self.model, self.data)
-        return self.data.qacc.copy()
+        return np.array(self.data.qacc)
 
     def _newton_step(self, residual: Array, hold: float, eps: float = 1e-6) -> None:
         pose = self.data.qpos.copy()
@@ -218,7 +218,7 @@ class Engine:
         self.data.qpos[:] = self._start
         self.data.qvel[:] = 0.0
         self.data.qacc[:] = 0.0
-        half = np.arange(2 * steps + 2) * (0.5 * STEP)
+        half = (0.5 * STEP) * np.arange(2 * steps + 2, dtype=np.float64)
         if motor is None:
             shaft, force = np.zeros((len(half), 2)), np.zeros((len(half), 3))
         else:
@@ -263,7 +263,7 @@ class Engine:
         n = self.cables
         quaternion = rows[:, [4, 5, 6, 3]]
         return Trajectory(
-            time=np.arange(len(rows)) * (STEP * RECORD_EVERY),
+            time=np.arange(len(rows), dtype=np.float64) * (STEP * RECORD_EVERY),
             position=rows[:, :3],
             quaternion=quaternion,
             velocity=rows[:, 7:10],

@@ -130,8 +130,8 @@ def mark(
         parameters=_parameters(effects, answer),
         before=before,
         after=mark_ten(answer.ten, true),
-        holdout_before=answer.evidence("holdout_error_before"),
-        holdout_after=answer.evidence("holdout_error_after"),
+        holdout_before=answer.holdout_before,
+        holdout_after=answer.holdout_after,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from bench.concealed.effects.base import Effect
@@ -135,7 +136,7 @@ def record(
     )
 
 
-def _rows(time: Array, plan: Plan, schedule: tuple[int, int]) -> Array:
+def _rows(time: Array, plan: Plan, schedule: tuple[int, int]) -> NDArray[np.int_]:
     offset, interval = schedule
     begin = round(1000.0 * plan.first_sample) + offset
     return np.arange(begin, len(time), interval)

@@ -37,5 +37,5 @@ class ImuBias(Effect):
     def alter(self, scene: Scene) -> Scene:
         """See :class:`Effect`."""
         field = "rate_bias" if self.measured == "angular_rate" else "acceleration_bias"
-        bias = with_entry(getattr(scene.errors, field), self.axis, self.value)
-        return replace(scene, errors=replace(scene.errors, **{field: bias}))
+        changed: dict[str, Any] = {field: with_entry(getattr(scene.errors, field), self.axis, self.value)}
+        return replace(scene, errors=replace(scene.errors, **changed))

@@ -35,5 +35,5 @@ class ImuScale(Effect):
     def alter(self, scene: Scene) -> Scene:
         """See :class:`Effect`."""
         field = "rate_scale" if self.measured == "angular_rate" else "acceleration_scale"
-        scale = with_entry(getattr(scene.errors, field), self.axis, self.scale)
-        return replace(scene, errors=replace(scene.errors, **{field: scale}))
+        changed: dict[str, Any] = {field: with_entry(getattr(scene.errors, field), self.axis, self.scale)}
+        return replace(scene, errors=replace(scene.errors, **changed))
