@@ -52,17 +52,25 @@ def drive(run: Run, parameters: ParameterSet, theta: Array) -> Input:
 
 
 def start_basis(model: RigModel, state: State) -> Array:
-    """(12, 2 dof): directions in which a start state can differ, cables kept; in START_UNIT."""
+    """(12 + 2 s, 2 dof + 2 s): directions in which a start state can differ, cables kept; in START_UNIT."""
     n = model.cables
     G, gap, rate = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
     count = rigid_jacobian(
-        model.physics, model.modes, state.vector(), np.array(state.R_world_body, order="C"), G, gap, rate
+        model.physics,
+        model.modes,
+        state.vector(model.states),
+        np.array(state.R_world_body, order="C"),
+        G,
+        gap,
+        rate,
     )
     free = null_space(G[:count], rcond=1e-6) if count else np.eye(6)
     dof = free.shape[1]
-    basis = np.zeros((12, 2 * dof))
+    inner = model.states - layout.BODY_STATE
+    basis = np.zeros((model.states, 2 * dof + inner))
     basis[:6, :dof] = START_UNIT * free
-    basis[6:, dof:] = START_UNIT * free
+    basis[6:12, dof : 2 * dof] = START_UNIT * free
+    basis[12:, 2 * dof :] = START_UNIT * np.eye(inner)
     return basis
 
 
@@ -110,7 +118,7 @@ class Linearised:
     axis: NDArray[np.int64]  # (m,) column within the channel
     plain: Array  # (m,) residual before whitening, in the channel's unit
     variance: Array  # (m,) sensor noise of each row
-    row_H: Array  # (m, 12) response of each row to the state at its node
+    row_H: Array  # (m, 12 + 2 s) response of each row to the state at its node
     row_D: Array  # (m, 6) ... and to the wrench
     Q: Array  # (N, 6, 6) covariance of the wrench that noise stands for
     latent: Array  # (N, 6) wrench noise that the nominal motion holds
@@ -151,7 +159,7 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
 def _channel_rows(
     bench: Bench, run: Run, channel: Channel, motion: Motion, reading: sensors.Reading, own: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, 12), D (g, w, 6))."""
+    """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, X), D (g, w, 6))."""
     parameters = bench.parameters
     late, clock = 0.0, parameters.places.clock(channel.device)
     if clock is not None:
@@ -242,7 +250,7 @@ def linearise_run(
                 np.repeat(channel.node, axes),
                 np.full(rows, index, dtype=np.int64),
                 np.tile(np.arange(axes), channel.node.size),
-                H.reshape(rows, 12),
+                H.reshape(rows, -1),
                 D.reshape(rows, 6),
                 channel.grouped_variance.ravel(),
                 np.concatenate([residual.reshape(rows, 1), full.reshape(rows, width)], axis=1),
@@ -284,8 +292,8 @@ def linearise_run(
 def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array, Array, Array]:
     """Best correction of the nominal motion by the noise that enters as force, given the whole run.
 
-    start (12, 12): covariance of the start state (none: it is exact). Returns (N, 12) state
-    and (N, 6) wrench corrections and (N, 12, 12) covariance of the filtered state.
+    start (X, X), X = 12 + 2 s: covariance of the start state (none: it is exact). Returns (N, X)
+    state and (N, 6) wrench corrections and (N, X, X) covariance of the filtered state.
     """
     motion = linearised.motion
     return smooth(  # type: ignore[no-any-return]
@@ -298,5 +306,5 @@ def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array,
         linearised.row_D,
         linearised.variance,
         linearised.plain,
-        np.zeros((12, 12)) if start is None else start,
+        np.zeros((motion.states.shape[1],) * 2) if start is None else start,
     )

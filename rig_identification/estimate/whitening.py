@@ -18,38 +18,39 @@ from numba import njit
 def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-untyped-def]
     """Replace ``columns`` (m, c) by their normalised innovations; returns the sum of log standard deviations.
 
-    node (m,): ascending node index of each row. H (m, 12), D (m, 6): response of the row to
-    state and wrench. variance (m,): sensor noise of the row. Q (N, 6, 6): covariance of the
+    node (m,): ascending node index of each row. H (m, X), D (m, 6): response of the row to
+    state (X = 12 and twice the internal coordinates) and wrench. variance (m,): sensor noise of the row. Q (N, 6, 6): covariance of the
     wrench over each interval. latent (N, 6): wrench that the nominal motion already holds of
     this noise, whose mean is zero all the same. Column 0 is measured less predicted, the others derivatives
     of the prediction.
     """
     rows, count = columns.shape
-    size = 18
+    states = A.shape[1]
+    size = states + 6
     P = np.zeros((size, size))
     X = np.zeros((size, count))
     gain = np.empty(size)
     h = np.empty(size)
     log_sum = 0.0
     row = 0
-    x_next = np.empty((12, count))
-    P_next = np.empty((12, 12))
-    F = np.empty((12, size))
+    x_next = np.empty((states, count))
+    P_next = np.empty((states, states))
+    F = np.empty((states, size))
     for k in range(A.shape[0]):
         for i in range(6):
             for j in range(6):
-                P[12 + i, 12 + j] = Q[k, i, j]
-            for j in range(12):
-                P[12 + i, j] = 0.0
-                P[j, 12 + i] = 0.0
+                P[states + i, states + j] = Q[k, i, j]
+            for j in range(states):
+                P[states + i, j] = 0.0
+                P[j, states + i] = 0.0
             for c in range(count):
-                X[12 + i, c] = 0.0
-            X[12 + i, 0] = -latent[k, i]
+                X[states + i, c] = 0.0
+            X[states + i, 0] = -latent[k, i]
         while row < rows and node[row] == k:
-            for i in range(12):
+            for i in range(states):
                 h[i] = H[row, i]
             for i in range(6):
-                h[12 + i] = D[row, i]
+                h[states + i] = D[row, i]
             spread = variance[row]
             for i in range(size):
                 total = 0.0
@@ -74,19 +75,19 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
                 for j in range(size):
                     P[i, j] -= g * gain[j]
             row += 1
-        F[:, :12] = A[k]
-        F[:, 12:] = B[k]
-        for i in range(12):
+        F[:, :states] = A[k]
+        F[:, states:] = B[k]
+        for i in range(states):
             for c in range(count):
                 total = 0.0
                 for j in range(size):
                     total += F[i, j] * X[j, c]
                 x_next[i, c] = total
         P_next[:, :] = np.dot(np.dot(F, P), F.T)
-        for i in range(12):
+        for i in range(states):
             for c in range(count):
                 X[i, c] = x_next[i, c]
-            for j in range(12):
+            for j in range(states):
                 P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
     return log_sum
 
@@ -95,39 +96,40 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
 def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ignore[no-untyped-def]
     """Best correction of the nominal motion by noise that enters as force, given the whole run.
 
-    Arguments as in :func:`whiten`; residual (m,) measured less predicted; start (12, 12)
-    covariance of the start state. Returns (N, 12) state and (N, 6) wrench corrections, and
-    (N, 12, 12) covariance of the filtered state (fixed-interval smoother by the adjoint
+    Arguments as in :func:`whiten`; residual (m,) measured less predicted; start (X, X)
+    covariance of the start state. Returns (N, X) state and (N, 6) wrench corrections, and
+    (N, X, X) covariance of the filtered state (fixed-interval smoother by the adjoint
     recursion, which inverts no covariance: Durbin & Koopman, "Time Series Analysis by
     State Space Methods", 2012, section 4.4).
     """
     rows = residual.shape[0]
     nodes = A.shape[0]
-    size = 18
+    order = A.shape[1]
+    size = order + 6
     means = np.zeros((nodes, size))
     spreads = np.zeros((nodes, size, size))
     gains = np.zeros((rows, size))
     scaled = np.zeros(rows)
-    filtered = np.zeros((nodes, 12, 12))
+    filtered = np.zeros((nodes, order, order))
     P = np.zeros((size, size))
-    P[:12, :12] = start
+    P[:order, :order] = start
     x = np.zeros(size)
     h = np.empty(size)
-    F = np.empty((12, size))
+    F = np.empty((order, size))
     row = 0
     for k in range(nodes):
         for i in range(6):
-            x[12 + i] = -latent[k, i]
+            x[order + i] = -latent[k, i]
             for j in range(6):
-                P[12 + i, 12 + j] = Q[k, i, j]
-            for j in range(12):
-                P[12 + i, j] = 0.0
-                P[j, 12 + i] = 0.0
+                P[order + i, order + j] = Q[k, i, j]
+            for j in range(order):
+                P[order + i, j] = 0.0
+                P[j, order + i] = 0.0
         means[k] = x
         spreads[k] = P
         while row < rows and node[row] == k:
-            h[:12] = H[row]
-            h[12:] = D[row]
+            h[:order] = H[row]
+            h[order:] = D[row]
             Ph = np.dot(P, h)
             spread = variance[row] + np.dot(h, Ph)
             gains[row] = Ph / spread
@@ -138,31 +140,31 @@ def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ign
                 for j in range(size):
                     P[i, j] -= gains[row, i] * Ph[j]
             row += 1
-        filtered[k] = P[:12, :12]
-        F[:, :12] = A[k]
-        F[:, 12:] = B[k]
+        filtered[k] = P[:order, :order]
+        F[:, :order] = A[k]
+        F[:, order:] = B[k]
         x_next = np.dot(F, x)
         P_next = np.dot(np.dot(F, P), F.T)
-        x[:12] = x_next
-        for i in range(12):
-            for j in range(12):
+        x[:order] = x_next
+        for i in range(order):
+            for j in range(order):
                 P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
-    states = np.zeros((nodes, 12))
+    states = np.zeros((nodes, order))
     wrenches = np.zeros((nodes, 6))
     adjoint = np.zeros(size)
     row = rows - 1
     for k in range(nodes - 1, -1, -1):
         if k < nodes - 1:
-            F[:, :12] = A[k]
-            F[:, 12:] = B[k]
-            adjoint = np.dot(F.T, np.ascontiguousarray(adjoint[:12]))
+            F[:, :order] = A[k]
+            F[:, order:] = B[k]
+            adjoint = np.dot(F.T, np.ascontiguousarray(adjoint[:order]))
         while row >= 0 and node[row] == k:
-            h[:12] = H[row]
-            h[12:] = D[row]
+            h[:order] = H[row]
+            h[order:] = D[row]
             weight = scaled[row] - np.dot(gains[row], adjoint)
             adjoint = adjoint + h * weight
             row -= 1
         best = means[k] + np.dot(spreads[k], adjoint)
-        states[k] = best[:12]
-        wrenches[k] = best[12:]
+        states[k] = best[:order]
+        wrenches[k] = best[order:]
     return states, wrenches, filtered

@@ -15,8 +15,10 @@ from numba import njit
 
 from rig_identification.model.arithmetic import STEP, invert, reciprocal, root
 from rig_identification.model.dynamics import rotation
+from rig_identification.model.effects.internal import ceiling_shift
 from rig_identification.model.layout import (
     BODY_POINT,
+    BODY_STATE,
     CABLE_SIZE,
     CABLES,
     CEILING_POINT,
@@ -29,19 +31,21 @@ from rig_identification.model.layout import (
 
 
 @njit(cache=True)
-def cable_length_and_rate(physics, offset, x, R, gradient):  # type: ignore[no-untyped-def]
+def cable_length_and_rate(physics, offset, shift, x, R, gradient):  # type: ignore[no-untyped-def]
     """(l, dl/dt) of the cable at ``offset``; gradient (6,) = dl/d(position, rotation increment).
 
-    dl/dt equals gradient . (v, w).
+    shift: of the upper hinges and its rate (effects/internal.py). dl/dt equals
+    gradient . (v - its rate, w).
     """
+    s0, s1, s2, c0, c1, c2 = shift
     bx, by, bz = (
         physics[offset + BODY_POINT],
         physics[offset + BODY_POINT + 1],
         physics[offset + BODY_POINT + 2],
     )
-    d0 = physics[offset + CEILING_POINT] - x[0] - (R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz)
-    d1 = physics[offset + CEILING_POINT + 1] - x[1] - (R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz)
-    d2 = physics[offset + CEILING_POINT + 2] - x[2] - (R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz)
+    d0 = physics[offset + CEILING_POINT] + s0 - x[0] - (R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz)
+    d1 = physics[offset + CEILING_POINT + 1] + s1 - x[1] - (R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz)
+    d2 = physics[offset + CEILING_POINT + 2] + s2 - x[2] - (R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz)
     length = root(d0 * d0 + d1 * d1 + d2 * d2)
     k = reciprocal(length)
     u0, u1, u2 = d0 * k, d1 * k, d2 * k
@@ -54,7 +58,7 @@ def cable_length_and_rate(physics, offset, x, R, gradient):  # type: ignore[no-u
     gradient[3] = -(by * uz - bz * uy)
     gradient[4] = -(bz * ux - bx * uz)
     gradient[5] = -(bx * uy - by * ux)
-    rate = length * 0.0
+    rate = -(gradient[0] * c0 + gradient[1] * c1 + gradient[2] * c2)
     for j in range(3):
         rate += gradient[j] * x[VELOCITY + j] + gradient[3 + j] * x[RATE + j]
     return length, rate
@@ -64,10 +68,11 @@ def cable_length_and_rate(physics, offset, x, R, gradient):  # type: ignore[no-u
 def rigid_jacobian(physics, modes, x, R, G, gap, rate):  # type: ignore[no-untyped-def]
     """Fill G (n, 6), gap (n,) = l - L and rate (n,) of the rigid cables; returns their number."""
     count = 0
+    shift = ceiling_shift(physics, modes.shape[0], x)
     for i in range(modes.shape[0]):
         if modes[i] == RIGID:
             offset = CABLES + CABLE_SIZE * i
-            length, speed = cable_length_and_rate(physics, offset, x, R, G[count])
+            length, speed = cable_length_and_rate(physics, offset, shift, x, R, G[count])
             gap[count] = length - physics[offset + LENGTH]
             rate[count] = speed
             count += 1
@@ -116,7 +121,7 @@ def update_reference(reference, x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def project_state(physics, modes, x, reference):  # type: ignore[no-untyped-def]
-    """Move state x (12,) and reference (3, 3) onto the rigid cables' manifold; returns max |l - L| before."""
+    """Move state x (12 + 2 s,) and reference (3, 3) onto the rigid cables' manifold; returns max |l - L| before."""
     n = modes.shape[0]
     G = np.empty((n, 6))
     gap = np.empty(n)
@@ -151,7 +156,7 @@ def project_state(physics, modes, x, reference):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def project_columns(physics, modes, x, reference, directions, first_direction, columns):  # type: ignore[no-untyped-def]
-    """Move sensitivity columns (12, m) of a projected state to the manifold's tangent.
+    """Move sensitivity columns (12 + 2 s, m) of a projected state to the manifold's tangent.
 
     Column ``first_direction + k`` is the derivative in physics[directions[k]]
     (directions below 0 touch no geometry); the others in quantities that touch none.
@@ -181,7 +186,7 @@ def project_columns(physics, modes, x, reference, directions, first_direction, c
         for d in range(6):
             xc[d] = complex(x[d], STEP)
             rotation(reference, xc, Rc)
-            _, speed = cable_length_and_rate(pc, offset, xc, Rc, gc)
+            _, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
             slope[row, d] = speed.imag / STEP
             xc[d] = x[d]
         rotation(reference, xc, Rc)
@@ -189,12 +194,19 @@ def project_columns(physics, modes, x, reference, directions, first_direction, c
             d = directions[k]
             if offset <= d < offset + LENGTH:
                 pc[d] = complex(physics[d], STEP)
-                length, speed = cable_length_and_rate(pc, offset, xc, Rc, gc)
+                length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
                 defect[row, first_direction + k] = length.imag / STEP
                 rate_defect[row, first_direction + k] = speed.imag / STEP
                 pc[d] = physics[d]
             elif d == offset + LENGTH:
                 defect[row, first_direction + k] = -1.0
+        for d in range(BODY_STATE, x.shape[0]):
+            xc[d] = complex(x[d], STEP)
+            length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
+            for c in range(m):
+                defect[row, c] += length.imag / STEP * columns[d, c]
+                rate_defect[row, c] += speed.imag / STEP * columns[d, c]
+            xc[d] = x[d]
         row += 1
     _subtract_projection(G, plus, count, defect, columns, 0)
     for row in range(count):

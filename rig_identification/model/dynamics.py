@@ -17,6 +17,8 @@ hinge. Its length l_i gives the last n rows:
               -u.(A + alpha x b) = u.(w x (w x b)) - (|s|^2 - (u.s)^2)/l,   s = R^T v + w x b
     elastic:  T = EA/L (l - L + tau dl/dt)         (Kelvin-Voigt; zero where it would push)
     slack:    T = 0
+Effects with internal coordinates (effects/internal.py) append q to the state (q and dq/dt
+after w) and d^2q/dt^2 to z, behind the tensions.
 ``assemble`` fills K and r of K z = r. It is written for real and complex arrays alike, so
 the same lines give the exact derivative in any input (see arithmetic.py): from
 K z = r follows dz = K^-1 (dr - dK z).
@@ -28,6 +30,8 @@ from numba import njit
 
 from rig_identification.model.arithmetic import reciprocal, root
 from rig_identification.model.effects.all import add_effects
+from rig_identification.model.effects.internal import add_ceiling, ceiling_shift
+from rig_identification.model.effects.place import SHARING
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
     AXIAL_STIFFNESS,
@@ -90,7 +94,7 @@ def rotation_rate(x, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[no-untyped-def]
-    """Fill K (6 + n, 6 + n) and r (6 + n,) of K z = r.
+    """Fill K (6 + n + s, 6 + n + s) and r (6 + n + s,) of K z = r, with s internal coordinates.
 
     physics: flat array of layout.py. modes (n,): see layout.py. mount (3, 3):
     described orientation of the exciter frame in body. x: local state. R (3, 3): pose.
@@ -103,9 +107,10 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
     ixx, ixy, ixz = physics[INERTIAL + 4], physics[INERTIAL + 5], physics[INERTIAL + 6]
     iyy, iyz, izz = physics[INERTIAL + 7], physics[INERTIAL + 8], physics[INERTIAL + 9]
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
-    for i in range(6 + n):
+    size = r.shape[0]
+    for i in range(size):
         r[i] = 0.0
-        for j in range(6 + n):
+        for j in range(size):
             K[i, j] = 0.0
     K[0, 0] = m
     K[1, 1] = m
@@ -151,7 +156,9 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
     for i in range(6):
         r[i] += wrench[i]
     _add_exciter(physics, mount, force, r)
-    v0, v1, v2 = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
+    # Cables see the body from their upper hinges, which a yielding ceiling moves
+    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
+    v0, v1, v2 = x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2
     vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
     vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2
     vz = R[0, 2] * v0 + R[1, 2] * v1 + R[2, 2] * v2
@@ -162,9 +169,9 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
             K[row, row] = 1.0
             continue
         bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-        d0 = physics[o + CEILING_POINT] - x[0]
-        d1 = physics[o + CEILING_POINT + 1] - x[1]
-        d2 = physics[o + CEILING_POINT + 2] - x[2]
+        d0 = physics[o + CEILING_POINT] + s0 - x[0]
+        d1 = physics[o + CEILING_POINT + 1] + s1 - x[1]
+        d2 = physics[o + CEILING_POINT + 2] + s2 - x[2]
         dx = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 - bx
         dy = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 - by
         dz = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 - bz
@@ -180,6 +187,8 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
         K[3, row] = -mx
         K[4, row] = -my
         K[5, row] = -mz
+        if size > 6 + n:
+            add_ceiling(physics, n, x, R, i, ux, uy, uz, modes[i] == RIGID, K)
         # w x b; s: velocity of the body hinge
         ex = wy * bz - wz * by
         ey = wz * bx - wx * bz
@@ -194,7 +203,7 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
             K[row, 4] = -my
             K[row, 5] = -mz
             # Softness at acceleration level: zero but where more cables than needed hold the body
-            K[row, row] = -physics[physics.shape[0] - 1]
+            K[row, row] = -physics[CABLES + CABLE_SIZE * n + SHARING]
             r[row] = (
                 ux * (wy * ez - wz * ey)
                 + uy * (wz * ex - wx * ez)

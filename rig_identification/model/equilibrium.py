@@ -20,6 +20,7 @@ from rig_identification.model.arithmetic import STEP
 from rig_identification.model.constraints import cable_length_and_rate, update_reference
 from rig_identification.model.dynamics import assemble, rotation
 from rig_identification.model.effects.cable_mass import weight_below_cell
+from rig_identification.model.effects.internal import ceiling_shift
 from rig_identification.model.effects.place import LINEAR_DENSITY
 from rig_identification.model.motion import Input, RigModel, State, on_cables, simulate
 from rig_identification.model.so3 import skew
@@ -29,8 +30,10 @@ Array = NDArray[np.float64]
 
 @njit(cache=True)
 def rest_defect(physics, modes, mount, x, R, tension, K, r, gradient, out):  # type: ignore[no-untyped-def]
-    """out (6 + n,): unbalanced wrench, then each cable's length less what its tension stretches it to."""
+    """out (6 + n + s,): unbalanced wrench, each cable's length less what its tension stretches it to, and
+    what accelerates each internal coordinate."""
     n = modes.shape[0]
+    shift = ceiling_shift(physics, n, x)
     force = np.zeros(3, dtype=x.dtype)
     wrench = np.zeros(6, dtype=x.dtype)
     assemble(physics, modes, mount, x, R, force, wrench, K, r)
@@ -40,18 +43,23 @@ def rest_defect(physics, modes, mount, x, R, tension, K, r, gradient, out):  # t
             out[i] -= K[i, 6 + j] * tension[j]
     for j in range(n):
         offset = layout.CABLES + layout.CABLE_SIZE * j
-        length, _ = cable_length_and_rate(physics, offset, x, R, gradient)
+        length, _ = cable_length_and_rate(physics, offset, shift, x, R, gradient)
         if modes[j] == layout.RIGID:
             out[6 + j] = length - physics[offset + layout.LENGTH]
         else:
             out[6 + j] = tension[j] - r[6 + j]
+    for i in range(6 + n, r.shape[0]):
+        out[i] = r[i]
+        for j in range(n):
+            out[i] -= K[i, 6 + j] * tension[j]
 
 
 @njit(cache=True)
 def rest_jacobian(physics, modes, mount, x, reference, tension, directions):  # type: ignore[no-untyped-def]
-    """(6 + n, 6 + n) in pose and tensions, and (6 + n, d) in ``directions``."""
+    """(6 + n + s, 6 + n + s) in pose, tensions and internal coordinates, and (6 + n + s, d) in ``directions``."""
     n = modes.shape[0]
-    size = 6 + n
+    behind = 6 + n
+    size = behind + (x.shape[0] - layout.BODY_STATE) // 2
     d = directions.shape[0]
     in_pose = np.zeros((size, size))
     in_physics = np.zeros((size, d))
@@ -64,8 +72,11 @@ def rest_jacobian(physics, modes, mount, x, reference, tension, directions):  # 
     for c in range(size + d):
         if c < 6:
             xc[c] = complex(x[c], STEP)
-        elif c < size:
+        elif c < behind:
             tc[c - 6] = complex(tension[c - 6], STEP)
+        elif c < size:
+            inner = layout.BODY_STATE + c - behind
+            xc[inner] = complex(x[inner], STEP)
         elif directions[c - size] >= 0:
             pc[directions[c - size]] = complex(physics[directions[c - size]], STEP)
         rotation(reference, xc, Rc)
@@ -77,8 +88,10 @@ def rest_jacobian(physics, modes, mount, x, reference, tension, directions):  # 
                 in_physics[i, c - size] = oc[i].imag / STEP
         if c < 6:
             xc[c] = x[c]
-        elif c < size:
+        elif c < behind:
             tc[c - 6] = tension[c - 6]
+        elif c < size:
+            xc[layout.BODY_STATE + c - behind] = x[layout.BODY_STATE + c - behind]
         elif directions[c - size] >= 0:
             pc[directions[c - size]] = physics[directions[c - size]]
     return in_pose, in_physics
@@ -130,11 +143,11 @@ def settle(model: RigModel, start: State, swings: int = 40) -> State:
 
     (Day, "An introduction to dynamic relaxation", The Engineer 219, 1965.)
     """
-    state = State(start.position, start.R_world_body, np.zeros(3), np.zeros(3))
+    state = State(start.position, start.R_world_body, np.zeros(3), np.zeros(3), start.internal)
     drive = Input.none(101, 0.01)
     for _ in range(swings):
         motion = simulate(model, state, drive)
-        speed = np.sum(motion.states[: motion.nodes, 6:] ** 2, axis=1)
+        speed = np.sum(motion.states[: motion.nodes, 6:12] ** 2, axis=1)
         peak = int(np.argmax(speed))
         reached = motion.state(peak)
         state = on_cables(model, State(reached.position, reached.R_world_body, np.zeros(3), np.zeros(3)))
@@ -149,10 +162,12 @@ def find_rest(
     """Rest pose near ``guess`` by Newton's method, with derivatives in ``directions`` of physics."""
     chosen = np.zeros(0, dtype=np.int64) if directions is None else np.asarray(directions, dtype=np.int64)
     n = model.cables
-    x, R = guess.vector(), np.array(guess.R_world_body, order="C")
-    x[6:] = 0.0
+    x, R = guess.vector(model.states), np.array(guess.R_world_body, order="C")
+    x[6:12] = 0.0
+    x[12 + model.internal :] = 0.0
     tension = np.full(n, model.physics[layout.INERTIAL] * np.linalg.norm(model.physics[:3]) / n)
-    K, r, out, gradient = np.empty((6 + n, 6 + n)), np.empty(6 + n), np.empty(6 + n), np.empty(6)
+    size = 6 + n + model.internal
+    K, r, out, gradient = np.empty((size, size)), np.empty(size), np.empty(size), np.empty(6)
     converged = False
     for _ in range(iterations):
         rest_defect(model.physics, model.modes, model.exciter_orientation, x, R, tension, K, r, gradient, out)
@@ -165,7 +180,8 @@ def find_rest(
             break
         scale = min(1.0, 0.1 / max(turn, 1e-300))
         x[:6] += scale * change[:6]
-        tension = tension + change[6:]
+        tension = tension + change[6 : 6 + n]
+        x[12 : 12 + model.internal] += change[6 + n :]
         update_reference(R, x)
         if converged:
             break
@@ -186,9 +202,9 @@ def find_rest(
             in_gravity[:, k] += R[d]
     J[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] = in_gravity
     J[0, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -in_gravity
-    J[0, layout.OUT_TENSION :] = implicit[6:]
+    J[0, layout.OUT_TENSION :] = implicit[6 : 6 + n]
     density = layout.effects_offset(n) + LINEAR_DENSITY
     for column in np.flatnonzero(chosen == density):
         J[0, layout.OUT_TENSION :, column] += own_weights(model, x, R, per_density=True)
-    state = State(x[:3].copy(), R, np.zeros(3), np.zeros(3))
+    state = State(x[:3].copy(), R, np.zeros(3), np.zeros(3), x[12:].copy())
     return Rest(state, tension, outputs, J, converged)

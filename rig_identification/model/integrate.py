@@ -23,7 +23,9 @@ from rig_identification.model.constraints import (
 )
 from rig_identification.model.dynamics import assemble, rotation, rotation_rate
 from rig_identification.model.effects.cable_mass import weight_below_cell
+from rig_identification.model.effects.internal import ceiling_shift
 from rig_identification.model.layout import (
+    BODY_STATE,
     CABLE_SIZE,
     CABLES,
     GRAVITY,
@@ -66,8 +68,8 @@ def solve(physics, modes, mount, x, R, force, wrench, K, r, inverse, z):  # type
 
 @njit(cache=True, nogil=True)
 def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z, inverse, directions, out):  # type: ignore[no-untyped-def]
-    """out (6 + n, 12 + 6 + len(directions)) = dz in state, wrench and physics, by complex step."""
-    size = z.shape[0]
+    """out (6 + n + s, 12 + 2 s + 6 + len(directions)) = dz in state, wrench and physics, by complex step."""
+    size, states = z.shape[0], x.shape[0]
     xc = x.astype(np.complex128)
     pc = physics.astype(np.complex128)
     fc = force.astype(np.complex128)
@@ -76,15 +78,15 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
     Kc = np.empty((size, size), dtype=np.complex128)
     rc = np.empty(size, dtype=np.complex128)
     change = np.empty(size)
-    first = 12 + WRENCH
+    first = states + WRENCH
     block = CABLES + CABLE_SIZE * modes.shape[0]
     weighty = physics.shape[0] > block
-    for column in range(12 + directions.shape[0]):
-        target = column if column < 12 else column + WRENCH
-        if column < 12:
+    for column in range(states + directions.shape[0]):
+        target = column if column < states else column + WRENCH
+        if column < states:
             xc[column] = complex(x[column], STEP)
         else:
-            d = directions[column - 12]
+            d = directions[column - states]
             if d == EXCITER_CLOCK:
                 for i in range(3):
                     fc[i] = complex(force[i], STEP * force_rate[i])
@@ -103,15 +105,15 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
                 total += inverse[i, j] * change[j]
             out[i, target] = total
         if weighty:
-            for i in range(size - 6):
+            for i in range(modes.shape[0]):
                 out[6 + i, target] += weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
-        if column < 12:
+        if column < states:
             xc[column] = x[column]
-        elif directions[column - 12] == EXCITER_CLOCK:
+        elif directions[column - states] == EXCITER_CLOCK:
             for i in range(3):
                 fc[i] = force[i]
         else:
-            pc[directions[column - 12]] = physics[directions[column - 12]]
+            pc[directions[column - states]] = physics[directions[column - states]]
     for i in range(size):
         for j in range(WRENCH):
             out[i, first - WRENCH + j] = inverse[i, j]
@@ -119,21 +121,29 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
 
 @njit(cache=True, nogil=True)
 def _stage_columns(x, R, z, dz, columns, slopes):  # type: ignore[no-untyped-def]
-    """slopes (12, m) = d(dx/dt) for stage columns (12, m): state, wrench, physics blocks."""
+    """slopes (12 + 2 s, m) = d(dx/dt) for stage columns (12 + 2 s, m): state, wrench, physics blocks."""
     m = columns.shape[1]
-    # z responds to the state through dz's first 12 columns, and directly to wrench and physics
+    states = x.shape[0]
+    internal = (states - BODY_STATE) // 2
+    behind = z.shape[0] - internal - 6
+    # z responds to the state through dz's first columns, and directly to wrench and physics
     for c in range(m):
         for i in range(3):
             slopes[i, c] = columns[VELOCITY + i, c]
-    response = np.zeros((6, m))
-    for i in range(6):
-        for d in range(12):
-            g = dz[i, d]
+    response = np.zeros((6 + internal, m))
+    for i in range(6 + internal):
+        row = i if i < 6 else i + behind
+        for d in range(states):
+            g = dz[row, d]
             if g != 0.0:
                 for c in range(m):
                     response[i, c] += g * columns[d, c]
-        for c in range(12, m):
-            response[i, c] += dz[i, c]
+        for c in range(states, m):
+            response[i, c] += dz[row, c]
+    for j in range(internal):
+        for c in range(m):
+            slopes[BODY_STATE + j, c] = columns[BODY_STATE + internal + j, c]
+            slopes[BODY_STATE + internal + j, c] = response[6 + j, c]
     # dv/dt = R A: change of A, and of R: R (dtheta x A), dtheta = J_r(phi) dphi ~ dphi - phi x dphi / 2
     p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
     w0, w1, w2 = x[RATE], x[RATE + 1], x[RATE + 2]
@@ -194,7 +204,7 @@ def _absorb_rotation_columns(x, columns):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _write_outputs(physics, modes, R, x, z, out):  # type: ignore[no-untyped-def]
-    n = z.shape[0] - 6
+    n = modes.shape[0]
     block = CABLES + CABLE_SIZE * n
     for i in range(3):
         out[OUT_POSITION + i] = x[i]
@@ -213,9 +223,9 @@ def _write_outputs(physics, modes, R, x, z, out):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _write_output_columns(physics, R, dz, directions, out):  # type: ignore[no-untyped-def]
-    """out (OUT_TENSION + n, 18 + len(directions)): derivative of raw outputs in state, wrench, physics."""
-    n = dz.shape[0] - 6
+def _write_output_columns(physics, states, R, dz, directions, out):  # type: ignore[no-untyped-def]
+    """out (OUT_TENSION + n, states + 6 + d): derivative of raw outputs in state, wrench, physics."""
+    n = out.shape[0] - OUT_TENSION
     m = dz.shape[1]
     for i in range(OUT_TENSION):
         for c in range(m):
@@ -242,7 +252,7 @@ def _write_output_columns(physics, R, dz, directions, out):  # type: ignore[no-u
         d = directions[k]
         if GRAVITY <= d < GRAVITY + 3:
             for i in range(3):
-                out[OUT_GRAVITY + i, 12 + WRENCH + k] = R[d - GRAVITY, i]
+                out[OUT_GRAVITY + i, states + WRENCH + k] = R[d - GRAVITY, i]
     for i in range(3):
         for c in range(m):
             out[OUT_SPECIFIC_FORCE + i, c] -= out[OUT_GRAVITY + i, c]
@@ -264,7 +274,8 @@ def _switch_cables(physics, modes, x, reference, z, can_slacken):  # type: ignor
         elif modes[i] == SLACK:
             o = CABLES + CABLE_SIZE * i
             gradient = np.empty(6)
-            length, rate = cable_length_and_rate(physics, o, x, reference, gradient)
+            shift = ceiling_shift(physics, modes.shape[0], x)
+            length, rate = cable_length_and_rate(physics, o, shift, x, reference, gradient)
             if length > physics[o + LENGTH] and rate > 0.0:
                 modes[i] = RIGID
                 changed = True
@@ -298,28 +309,30 @@ def propagate(  # type: ignore[no-untyped-def]
 ):
     """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
 
-    x (12,) and reference (3, 3): start, destroyed. forces, force_rates (N, 3): exciter force
+    x (12 + 2 s,) and reference (3, 3): start, destroyed; s: internal coordinates. forces, force_rates (N, 3): exciter force
     in its frame and its rate at the nodes, linear between. wrenches (N, 6): further wrench,
     body axes, held over the interval. directions (d,): entries of ``physics`` to
-    differentiate in (EXCITER_CLOCK: clock). start_columns (12, s + d): derivative of the
-    start state in s start coordinates and the d directions.
-    Filled: nodes_x (N, 12), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and where
-    ``sensitivity``: A (N, 12, 12), B (N, 12, 6), H (N, OUT_TENSION + n, 12), D (N, OUT_TENSION + n, 6), and
-    J (N, OUT_TENSION + n, s + d), total derivatives of the raw outputs.
+    differentiate in (EXCITER_CLOCK: clock). start_columns (X, b + d): derivative of the
+    start state, X = 12 + 2 s, in b start coordinates and the d directions.
+    Filled: nodes_x (N, X), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and where
+    ``sensitivity``: A (N, X, X), B (N, X, 6), H (N, OUT_TENSION + n, X), D (N, OUT_TENSION + n, 6), and
+    J (N, OUT_TENSION + n, b + d), total derivatives of the raw outputs.
     """
     nodes = forces.shape[0]
     n = modes.shape[0]
-    size = 6 + n
+    states = x.shape[0]
+    internal = (states - BODY_STATE) // 2
+    size = 6 + n + internal
     d = directions.shape[0]
-    local = 12 + WRENCH + d
+    local = states + WRENCH + d
     starts = start_columns.shape[1] - d
     K = np.empty((size, size))
     r = np.empty(size)
     inverse = np.empty((size if sensitivity else 0, size))
     z = np.empty(size)
     R = np.empty((3, 3))
-    k = np.empty((4, 12))
-    y = np.empty(12)
+    k = np.empty((4, states))
+    y = np.empty(states)
     phi_rate = np.empty(3)
     force = np.empty(3)
     rate = np.empty(3)
@@ -327,9 +340,9 @@ def propagate(  # type: ignore[no-untyped-def]
     weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
     ahead = np.array([0.0, 0.5, 0.5, 1.0])
     dz = np.empty((size, local if sensitivity else 0))
-    columns = np.zeros((12, local if sensitivity else 0))
-    stage = np.zeros((12, local if sensitivity else 0))
-    slopes = np.empty((4, 12, local if sensitivity else 0))
+    columns = np.zeros((states, local if sensitivity else 0))
+    stage = np.zeros((states, local if sensitivity else 0))
+    slopes = np.empty((4, states, local if sensitivity else 0))
     out_columns = np.empty((OUT_TENSION + n, local if sensitivity else 0))
     S = start_columns.copy()
     for node in range(nodes):
@@ -337,11 +350,11 @@ def propagate(  # type: ignore[no-untyped-def]
         wrench = wrenches[node]
         if sensitivity:
             columns[:, :] = 0.0
-            for i in range(12):
+            for i in range(states):
                 columns[i, i] = 1.0
         for sub in range(1 if last else substeps):
             for s in range(4):
-                for i in range(12):
+                for i in range(states):
                     y[i] = x[i] + (h * ahead[s] * k[s - 1, i] if s > 0 else 0.0)
                 at = (sub + ahead[s]) / substeps
                 for i in range(3):
@@ -367,11 +380,11 @@ def propagate(  # type: ignore[no-untyped-def]
                     nodes_R[node] = R
                     _write_outputs(physics, modes, R, y, z, nodes_out[node])
                     if sensitivity:
-                        _write_output_columns(physics, R, dz, directions, out_columns)
-                        H[node] = out_columns[:, :12]
-                        D[node] = out_columns[:, 12 : 12 + WRENCH]
-                        total = np.dot(np.ascontiguousarray(out_columns[:, :12]), S)
-                        total[:, starts:] += out_columns[:, 12 + WRENCH :]
+                        _write_output_columns(physics, states, R, dz, directions, out_columns)
+                        H[node] = out_columns[:, :states]
+                        D[node] = out_columns[:, states : states + WRENCH]
+                        total = np.dot(np.ascontiguousarray(out_columns[:, :states]), S)
+                        total[:, starts:] += out_columns[:, states + WRENCH :]
                         J[node] = total
                     if last:
                         return nodes
@@ -381,15 +394,18 @@ def propagate(  # type: ignore[no-untyped-def]
                     k[s, ROTATION + i] = phi_rate[i]
                     k[s, VELOCITY + i] = R[i, 0] * z[0] + R[i, 1] * z[1] + R[i, 2] * z[2]
                     k[s, RATE + i] = z[3 + i]
+                for i in range(internal):
+                    k[s, BODY_STATE + i] = y[BODY_STATE + internal + i]
+                    k[s, BODY_STATE + internal + i] = z[6 + n + i]
                 if sensitivity:
                     if s == 0:
                         stage[:, :] = columns
                     else:
-                        for i in range(12):
+                        for i in range(states):
                             for c in range(local):
                                 stage[i, c] = columns[i, c] + h * ahead[s] * slopes[s - 1, i, c]
                     _stage_columns(y, R, z, dz, stage, slopes[s])
-            for i in range(12):
+            for i in range(states):
                 total_rate = 0.0
                 for s in range(4):
                     total_rate += weights[s] * k[s, i]
@@ -398,17 +414,17 @@ def propagate(  # type: ignore[no-untyped-def]
                     return node
             if sensitivity:
                 for s in range(4):
-                    for i in range(12):
+                    for i in range(states):
                         for c in range(local):
                             columns[i, c] += h * weights[s] * slopes[s, i, c]
                 _absorb_rotation_columns(x, columns)
             update_reference(reference, x)
             project_state(physics, modes, x, reference)
             if sensitivity:
-                project_columns(physics, modes, x, reference, directions, 12 + WRENCH, columns)
+                project_columns(physics, modes, x, reference, directions, states + WRENCH, columns)
         if sensitivity:
-            A[node] = columns[:, :12]
-            B[node] = columns[:, 12 : 12 + WRENCH]
-            S = np.dot(np.ascontiguousarray(columns[:, :12]), S)
-            S[:, starts:] += columns[:, 12 + WRENCH :]
+            A[node] = columns[:, :states]
+            B[node] = columns[:, states : states + WRENCH]
+            S = np.dot(np.ascontiguousarray(columns[:, :states]), S)
+            S[:, starts:] += columns[:, states + WRENCH :]
     return nodes

@@ -22,7 +22,21 @@ AXIAL_STIFFNESS = 7  # EA, N
 AXIAL_DAMPING = 8  # time constant tau of Kelvin-Voigt damping, s
 CELL_AT_CEILING = 9  # 1: the load cell sits at the ceiling end; 0: at the body
 
-# Local state of the body: see dynamics.py
+# One internal coordinate (effects/internal.py); its block follows the effects' block
+KIND = 0  # constant: RIDER or CEILING
+LEADER = 1  # constant: number of the coordinate that holds what those of one mass share
+AXIS = 2  # 3: direction, in body (rider) or world (ceiling)
+MASS = 5  # kg (rider)
+POINT = 6  # 3: m, body: where a rider rests
+FREQUENCY = 9  # Hz
+DAMPING_RATIO = 10
+COMPLIANCE = 11  # m/N (ceiling)
+STOP = 12  # m: a rider meets its stops this far from rest; 0: it has none
+INTERNAL_SIZE = 13
+RIDER = 0.0
+CEILING = 1.0
+
+# Local state of the body: see dynamics.py. Internal coordinates follow, then their rates
 POSITION = 0
 ROTATION = 3
 VELOCITY = 6

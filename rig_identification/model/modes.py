@@ -86,7 +86,7 @@ def _free_directions(model: RigModel, rest: State) -> Array:
     n = model.cables
     G, gap, rate = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
     turn = np.array(rest.R_world_body, order="C")
-    count = rigid_jacobian(model.physics, model.modes, rest.vector(), turn, G, gap, rate)
+    count = rigid_jacobian(model.physics, model.modes, rest.vector(model.states), turn, G, gap, rate)
     return np.asarray(null_space(G[:count], rcond=1e-6)) if count else np.eye(6)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from rig_identification.model import layout
 from rig_identification.model.body import linear_from_elements
 from rig_identification.model.constraints import project_columns, project_state
-from rig_identification.model.effects.place import EFFECTS_SIZE
+from rig_identification.model.effects.internal import STOP_FREQUENCY
+from rig_identification.model.effects.place import EFFECTS_SIZE, SHARING, internal_block
 from rig_identification.model.integrate import propagate
 from rig_identification.rig import Rig
 
@@ -31,6 +32,25 @@ class RigModel:
     def cables(self) -> int:
         """Number of cables."""
         return int(self.modes.size)
+
+    @property
+    def internal(self) -> int:
+        """Number of internal coordinates (effects/internal.py)."""
+        return int((self.physics.size - internal_block(self.cables, 0)) // layout.INTERNAL_SIZE)
+
+    @property
+    def states(self) -> int:
+        """Length of the local state."""
+        return layout.BODY_STATE + 2 * self.internal
+
+    def with_internal(self, blocks: Array) -> RigModel:
+        """The same rig with further internal coordinates. blocks (s, INTERNAL_SIZE): see layout.py.
+
+        A leader counts from the first of the blocks given.
+        """
+        added = np.array(blocks, dtype=float)
+        added[:, layout.LEADER] += self.internal
+        return self.with_physics(np.concatenate([self.physics, added.ravel()]))
 
     def with_physics(self, physics: Array) -> RigModel:
         """The same rig with other numbers."""
@@ -82,7 +102,7 @@ def rig_model(
         physics[o + layout.LENGTH] = cable.length
         physics[o + layout.CELL_AT_CEILING] = float(cable.load_cell == "ceiling")
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
-    physics[-1] = SOFTNESS if redundant(rig) else 0.0
+    physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic
     return RigModel(
@@ -101,29 +121,37 @@ class State:
     R_world_body: Array  # (3, 3)
     velocity: Array  # (3,) m/s, world
     rate: Array  # (3,) rad/s, body axes
+    internal: Array = field(default_factory=lambda: np.zeros(0))  # (2 s,) internal coordinates, their rates
 
-    def vector(self) -> Array:
-        """(12,) local state with zero rotation increment."""
-        return np.concatenate([self.position, np.zeros(3), self.velocity, self.rate])
+    def vector(self, size: int | None = None) -> Array:
+        """(12 + 2 s,) local state with zero rotation increment.
+
+        size: length wanted; internal coordinates of which nothing is known are at rest.
+        """
+        inner = self.internal
+        if size is not None and inner.size != size - layout.BODY_STATE:
+            inner = np.zeros(size - layout.BODY_STATE)
+        return np.concatenate([self.position, np.zeros(3), self.velocity, self.rate, inner])
 
     def moved(self, increment: Array) -> State:
-        """State displaced by (12,): position (world), rotation (body, right), velocity, rate."""
+        """State displaced by (12 + 2 s,): position (world), rotation (body, right), velocity, rate, internal."""
         return State(
             position=self.position + increment[:3],
             R_world_body=self.R_world_body @ Rotation.from_rotvec(increment[3:6]).as_matrix(),
             velocity=self.velocity + increment[6:9],
             rate=self.rate + increment[9:12],
+            internal=self.vector(increment.size)[12:] + increment[12:],
         )
 
 
 def state_from_vector(x: Array, R: Array) -> State:
     """Inverse of :meth:`State.vector`."""
-    return State(x[:3].copy(), np.array(R), x[6:9].copy(), x[9:12].copy())
+    return State(x[:3].copy(), np.array(R), x[6:9].copy(), x[9:12].copy(), x[12:].copy())
 
 
 def on_cables(model: RigModel, state: State) -> State:
     """The nearest state at which every rigid cable has its length and keeps it."""
-    x, R = state.vector(), np.array(state.R_world_body, order="C")
+    x, R = state.vector(model.states), np.array(state.R_world_body, order="C")
     project_state(model.physics, model.modes, x, R)
     return state_from_vector(x, R)
 
@@ -151,7 +179,7 @@ class Motion:
     """
 
     step: float
-    states: Array  # (N, 12)
+    states: Array  # (N, 12 + 2 s)
     R_world_body: Array  # (N, 3, 3)
     outputs: Array  # (N, 18 + n)
     nodes: int  # nodes reached: fewer than asked where the motion left every bound
@@ -185,8 +213,8 @@ FIT_STEP = 0.005
 
 
 def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> int:
-    """Substeps no longer than ``longest`` that resolve the stiffest elastic mode: omega h <= 0.5."""
-    plain = max(1, int(np.ceil(step / longest - 1e-9)))
+    """Substeps no longer than ``longest`` that resolve the stiffest mode: omega h <= 0.5."""
+    plain = max(1, int(np.ceil(step / longest - 1e-9)), int(np.ceil(step * _fastest_internal(model) / 0.5)))
     elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
     if not np.any(elastic):
         return plain
@@ -197,6 +225,16 @@ def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> in
     # Pitch and roll on the cables run faster than bounce by at most arm over gyration radius, about 2
     omega = 2.0 * np.sqrt(stiffness / model.physics[layout.INERTIAL])
     return max(plain, int(np.ceil(step * omega / 0.5)))
+
+
+def _fastest_internal(model: RigModel) -> float:
+    """Highest angular frequency (rad/s) of the internal coordinates."""
+    fastest = 0.0
+    for k in range(model.internal):
+        o = internal_block(model.cables, k)
+        stops = STOP_FREQUENCY if model.physics[o + layout.STOP] > 0.0 else 0.0
+        fastest = max(fastest, 2.0 * np.pi * max(abs(model.physics[o + layout.FREQUENCY]), stops))
+    return fastest
 
 
 def simulate(
@@ -210,24 +248,25 @@ def simulate(
 ) -> Motion:
     """Motion from ``start`` under ``drive``; with derivatives where ``directions`` is given.
 
-    directions (d,): entries of ``model.physics`` (or EXCITER_CLOCK). start_basis (12, s):
+    directions (d,): entries of ``model.physics`` (or EXCITER_CLOCK). start_basis (12 + 2 s, b):
     directions of the start state, each a column; the start follows the cables where a
     direction of ``physics`` moves them. The start itself is put on the cables first.
     """
     sensitivity = directions is not None
     chosen = np.zeros(0, dtype=np.int64) if directions is None else np.asarray(directions, dtype=np.int64)
-    basis = np.zeros((12, 0)) if start_basis is None else start_basis
-    x, R = start.vector(), np.array(start.R_world_body, order="C")
+    size = model.states
+    basis = np.zeros((size, 0)) if start_basis is None else start_basis
+    x, R = start.vector(size), np.array(start.R_world_body, order="C")
     project_state(model.physics, model.modes, x, R)
-    columns = np.zeros((12, basis.shape[1] + chosen.size))
+    columns = np.zeros((size, basis.shape[1] + chosen.size))
     columns[:, : basis.shape[1]] = basis
     project_columns(model.physics, model.modes, x, R, chosen, basis.shape[1], columns)
     nodes, outputs = drive.force.shape[0], layout.OUT_TENSION + model.cables
     kept = nodes if sensitivity else 0
-    states, rotations = np.zeros((nodes, 12)), np.zeros((nodes, 3, 3))
+    states, rotations = np.zeros((nodes, size)), np.zeros((nodes, 3, 3))
     out = np.zeros((nodes, outputs))
-    A, B = np.zeros((kept, 12, 12)), np.zeros((kept, 12, 6))
-    H, D = np.zeros((kept, outputs, 12)), np.zeros((kept, outputs, 6))
+    A, B = np.zeros((kept, size, size)), np.zeros((kept, size, 6))
+    H, D = np.zeros((kept, outputs, size)), np.zeros((kept, outputs, 6))
     J = np.zeros((kept, outputs, columns.shape[1]))
     done = propagate(
         model.physics,

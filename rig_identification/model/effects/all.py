@@ -10,6 +10,7 @@ from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.hinge_damping import add_hinge_damping
 from rig_identification.model.effects.hinge_friction import add_hinge_friction
+from rig_identification.model.effects.internal import add_internal
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.layout import CABLE_SIZE, CABLES
 
@@ -27,3 +28,4 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     add_exciter_rotor(physics, block, x, R, K, r)
     add_cable_mass(physics, block, modes, x, R, K, r)
     add_tether(physics, block, x, R, r)
+    add_internal(physics, block, modes, x, R, K, r)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from rig_identification.model.layout import CABLE_SIZE, CABLES
+from rig_identification.model.layout import CABLE_SIZE, CABLES, INTERNAL_SIZE
 
 DAMPING = 0  # N m s/rad
 FRICTION = 1  # N m
@@ -27,6 +27,11 @@ EFFECTS_SIZE = 28
 def effects_block(cables: int) -> int:
     """First entry of the effects' block."""
     return CABLES + CABLE_SIZE * cables
+
+
+def internal_block(cables: int, number: int) -> int:
+    """First entry of internal coordinate ``number``'s block."""
+    return effects_block(cables) + EFFECTS_SIZE + INTERNAL_SIZE * number
 
 
 @njit(cache=True, inline="always")
