@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -22,17 +25,26 @@ LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 FREELY_SPREAD = {"test_estimate_fit", "test_model_agreement", "test_model_conservation"}
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Keep together, in one of several workers, what shares a slow fixture, and all live nodes.
 
     Nodes talk in real time: two graphs at once on a small machine would starve each other.
+    By file, not by ``xdist_group`` marks: pytest 9.2 keeps test ids elsewhere, and pytest-xdist 3.8 then
+    drops every mark without a word.
     """
-    for item in items:
-        name = item.path.stem
-        if name.startswith("test_nodes"):
-            item.add_marker(pytest.mark.xdist_group("nodes"))
-        elif name not in FREELY_SPREAD:
-            item.add_marker(pytest.mark.xdist_group(name))
+    if config.getvalue("dist") != "loadgroup":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            name = Path(nodeid.partition("::")[0]).stem
+            if name in FREELY_SPREAD:
+                return nodeid
+            return "nodes" if name.startswith("test_nodes") else name
+
+    return ByFile(config, log)
 
 
 @pytest.fixture

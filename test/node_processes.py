@@ -9,13 +9,15 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import rclpy
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
@@ -38,7 +40,18 @@ with warnings.catch_warnings():  # the wheels' lark imports a deprecated module
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(rig_identification.__file__).parents[1]  # where nodes find what the tests import
-_DOMAINS = itertools.count(random.SystemRandom().randrange(1, 60))
+
+
+def _domains() -> Iterator[int]:
+    """ROS domains 1 to 100, from anywhere: those of one test run's workers never meet."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    start = random.Random(os.environ.get("PYTEST_XDIST_TESTRUNUID")).randrange(100)
+    span = 100 - 100 % workers  # else the second time round would shift one worker onto another
+    return (1 + (start + worker + workers * count) % span for count in itertools.count())
+
+
+_DOMAINS = _domains()
 
 RIG = """\
 /**:
@@ -64,9 +77,8 @@ SIMULATOR = [
 ]  # fmt: skip
 
 
-@functools.cache
-def compile_once() -> None:
-    """Compile what the nodes run, here and once: several processes would compile it at the same time."""
+def compile_plant_and_tracker() -> None:
+    """Run once through what the nodes run, so that its machine code lies in the package's cache."""
     top = YAML(typ="safe").load(RIG)["/**"]["ros__parameters"]
     rig = rig_from_fields(Fields(Path("rig"), "", top))
     plant = Plant(rig_model(rig, np.array(BODY)), 1)
@@ -78,13 +90,27 @@ def compile_once() -> None:
     tracker.add_imu(1_000_000 * np.arange(1, 60), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 9.8], (59, 1)))
 
 
+def _environment(**more: str) -> dict[str, str]:
+    path = os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")])
+    return {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1", **more}
+
+
+@functools.cache
+def compile_once() -> None:
+    """Compile before the first graph: its processes would all compile the same, at the same time.
+
+    In a process like theirs: what this one holds in memory says nothing about what they will find.
+    """
+    subprocess.run([sys.executable, __file__], cwd=tempfile.gettempdir(), env=_environment(), check=True)
+
+
 class Graph:
     """Nodes as processes, all in namespace ``/rig`` with the same rig description."""
 
     def __init__(self, folder: Path) -> None:
         compile_once()
         self.folder = folder
-        self.domain = next(_DOMAINS) % 100 + 1
+        self.domain = next(_DOMAINS)
         self.rig_file = folder / "rig.yaml"
         self.rig_file.write_text(RIG)
         self.processes: list[subprocess.Popen[str]] = []
@@ -97,13 +123,21 @@ class Graph:
             command += ["-r", remap]
         for parameter in parameters:
             command += ["-p", parameter]
-        environment = {
-            **os.environ, "ROS_DOMAIN_ID": str(self.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "PYTHONPATH": os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")]),
-            "OMP_NUM_THREADS": "1", "ROS_LOG_DIR": str(self.folder / "log"),
-        }  # fmt: skip
+        return self.run(command)
+
+    def run(self, command: Sequence[str]) -> subprocess.Popen[str]:
+        """Start any process that is to meet the graph's nodes."""
         process = subprocess.Popen(
-            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            command,
+            cwd=self.folder,  # ``-m`` looks in the working directory first: a checkout would hide PACKAGE
+            env=_environment(
+                ROS_DOMAIN_ID=str(self.domain),
+                ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
+                ROS_LOG_DIR=str(self.folder / "log"),
+            ),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
         self.processes.append(process)
         return process
@@ -188,3 +222,23 @@ class Probe:
         self.executor.shutdown()
         self.node.destroy_node()
         rclpy.try_shutdown(context=self.context)
+
+
+@pytest.fixture(name="graph")
+def graph_of_the_test(tmp_path: Path) -> Iterator[Graph]:
+    """A graph that ends with the test."""
+    made = Graph(tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture(name="probe")
+def probe_of_the_test(graph: Graph) -> Iterator[Probe]:
+    """A probe in the test's graph."""
+    made = Probe(graph)
+    yield made
+    made.close()
+
+
+if __name__ == "__main__":
+    compile_plant_and_tracker()

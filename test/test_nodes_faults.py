@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,7 +16,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
-from node_processes import SIMULATOR, Graph, Probe
+from node_processes import SIMULATOR, Graph, Probe, graph_of_the_test, probe_of_the_test  # noqa: F401
 from sensor_msgs.msg import Imu
 
 from rig_identification.session import read_session
@@ -26,20 +24,6 @@ from rig_identification.session import read_session
 NODES = (
     "rig_simulator", "load_cells", "imu", "inclinometer", "tracker", "preprocessor", "identifier", "recorder",
 )  # fmt: skip
-
-
-@pytest.fixture
-def graph(tmp_path: Path) -> Iterator[Graph]:
-    made = Graph(tmp_path)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def probe(graph: Graph) -> Iterator[Probe]:
-    made = Probe(graph)
-    yield made
-    made.close()
 
 
 class Diagnostics:
@@ -254,11 +238,9 @@ def test_a_client_that_dies_while_it_waits_harms_no_one(graph: Graph, probe: Pro
         "print('asked', flush=True);"
         "os.kill(os.getpid(), 9)"
     )
-    environment = {
-        **os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    }  # fmt: skip
-    ended = subprocess.run([sys.executable, "-c", client], env=environment, capture_output=True, text=True)
-    assert ended.stdout == "asked\n"
+    dying = graph.run([sys.executable, "-c", client])
+    output, _ = dying.communicate(timeout=40.0)
+    assert output == "asked\n"
     diagnostics = Diagnostics(probe)
     probe.spin_until(
         lambda: diagnostics.says("identifier: windows", "identify_center_of_mass, run 1"), 10.0, "the fit"

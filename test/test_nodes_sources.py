@@ -6,11 +6,9 @@ import itertools
 import os
 import pty
 import signal
-import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,24 +17,10 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 pytest.importorskip("serial", reason="pyserial is not installed: pip install '.[ros]'")
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from node_processes import PACKAGE, Graph, Probe
+from node_processes import Graph, Probe, graph_of_the_test, probe_of_the_test  # noqa: F401
 from sensor_msgs.msg import Imu
 
 from rig_identification.session import read_session
-
-
-@pytest.fixture
-def graph(tmp_path: Path) -> Iterator[Graph]:
-    made = Graph(tmp_path)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def probe(graph: Graph) -> Iterator[Probe]:
-    made = Probe(graph)
-    yield made
-    made.close()
 
 
 class Amplifier:
@@ -147,14 +131,7 @@ def test_one_command_brings_the_simulated_rig_up_and_down(graph: Graph, probe: P
         "--set", f"recorder.folder={folder}", "--set", "recorder.record_at_start=true",
         "--set", "rig_simulator.shake.at_start=true", "--set", "imu.simulation.rate=100",
     ]  # fmt: skip
-    environment = {
-        **os.environ, "ROS_DOMAIN_ID": str(graph.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "PYTHONPATH": str(PACKAGE),
-    }  # fmt: skip
-    process = subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-    graph.processes.append(process)
+    process = graph.run(command)
     heard = probe.listen(Imu, "imu/data_raw")
     probe.spin_until(lambda: len(heard) > 200, 120.0, "the simulated rig")
     assert graph.end(process, signal.SIGINT, within=40.0) == (0, "")
