@@ -27,6 +27,9 @@ def test_numbers(written):
     assert len(case["modes"]) == 2
     assert any("four cables at their length" in sentence for sentence in case["statements"])
     assert any("misses the published" in sentence for sentence in case["statements"])
+    assert any("Under 4 readings" in sentence for sentence in case["statements"])
+    assert len(case["wrench"]["std"]) == 6
+    assert 0.0 < case["wrench"]["std"][3] < 0.1 * case["wrench"]["size"][3]
 
 
 def test_figures_stand_alone_in_the_order_of_the_thesis(written):

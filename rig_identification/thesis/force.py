@@ -45,7 +45,8 @@ class HarmonicForce:
 
     In the plane ``xy`` it is Fx = A sin(2 pi f t), Fy = A cos(2 pi f t). The thesis says only
     that the two components are a quarter period apart (section 3.2); this order is the one
-    that gives back its published errors (case 14).
+    that gives back its published errors (case 14). ``phase`` and ``backwards`` are there for
+    what the thesis leaves open.
     """
 
     amplitude: float  # N
@@ -53,13 +54,15 @@ class HarmonicForce:
     plane: str  # "xy", "xz" or "yz": first axis sine, second cosine
     start: float  # s
     end: float  # s
+    phase: float = 0.0  # rad, at time 0
+    backwards: bool = False  # the second component turns its sign
 
     def force(self, time: Array) -> Array:
         """(n, 3) N at (n,) s, whether or not the segment acts then."""
-        phase = 2.0 * np.pi * self.frequency * time
+        phase = 2.0 * np.pi * self.frequency * time + self.phase
         vector = np.zeros((len(time), 3))
         vector[:, AXIS[self.plane[0]]] = self.amplitude * np.sin(phase)
-        vector[:, AXIS[self.plane[1]]] = self.amplitude * np.cos(phase)
+        vector[:, AXIS[self.plane[1]]] = (-1.0 if self.backwards else 1.0) * self.amplitude * np.cos(phase)
         return vector
 
 

@@ -13,7 +13,7 @@ from rig_identification import __version__
 from rig_identification.model.modes import Mode
 from rig_identification.thesis import read_text_remarks
 from rig_identification.thesis_report.table import ELEMENTS, absolute_elements, case_rows
-from rig_identification.thesis_rerun import CaseResult, Rerun, worst_percent
+from rig_identification.thesis_rerun import CaseResult, IntegratedPose, Rerun, worst_percent
 
 
 def rerun_document(found: Rerun, seconds: float) -> dict[str, Any]:
@@ -25,6 +25,18 @@ def rerun_document(found: Rerun, seconds: float) -> dict[str, Any]:
         "cases": [_case(result) for result in found.cases],
         "remarks": [{"where": where, "remark": remark} for where, remark in read_text_remarks()],
     }
+    if found.statics is not None:
+        s = found.statics
+        document["table_2_1"] = {
+            "axes": "the table's, z down; m",
+            "actual": s.actual,
+            "published": s.published,
+            "published_error": s.published - s.actual,
+            "found": s.found,
+            "found_error": s.found - s.actual,
+            "std": s.std,
+            "std_with_tensions": s.std_with_tensions,
+        }
     if found.tracking is not None:
         t = found.tracking
         document["tracking"] = {
@@ -78,6 +90,18 @@ def _case(result: CaseResult) -> dict[str, Any]:
             "error_in_sigma": result.realistic.error_in_sigma,
             "seconds": result.realistic.seconds,
         }
+    if result.wrench is not None:
+        out["wrench"] = {
+            "order": "force N, moment N m about the centre of mass, body axes; rms over the window",
+            "size": result.wrench.size,
+            "std": result.wrench.std,
+            "by_source": result.wrench.by_source,
+        }
+    if result.integration is not None:
+        out["integration"] = {
+            name: _integrated(pose)
+            for name, pose in (("ideal", result.integration.ideal), ("noisy", result.integration.noisy))
+        }
     if result.unknown_force is not None:
         unknown = result.unknown_force
         out["unknown_force"] = {
@@ -98,6 +122,15 @@ def _case(result: CaseResult) -> dict[str, Any]:
             "d_std": w.output_error_std,
         }
     return out
+
+
+def _integrated(pose: IntegratedPose) -> dict[str, Any]:
+    """Figures 4.1 and 4.2 in numbers."""
+    return {
+        "center_percent_worst": np.max(np.abs(pose.center_percent), axis=0),
+        "T_percent_worst": np.nanmax(np.abs(pose.T_percent), axis=0),
+        "T_worst": np.max(np.abs(pose.T - pose.true_T), axis=0),
+    }
 
 
 def _mode(mode: Mode) -> dict[str, Any]:

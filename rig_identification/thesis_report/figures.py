@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.report.line_chart import Curve, Panel, chart_svg, padded_limits
+from rig_identification.thesis_report.integration_figures import integration_figures
 from rig_identification.thesis_rerun import CaseResult, Rerun, Trace
 
 Array = NDArray[np.float64]
@@ -37,7 +38,8 @@ def case_figures(found: Rerun) -> Figures:
     by_case, files = {}, {}
     for result in found.cases:
         label = result.case.label
-        drawings = [(t.quantity, _trace_svg(label, t)) for t in result.traces]
+        drawings = [] if result.integration is None else integration_figures(result.integration)
+        drawings += [(t.quantity, _trace_svg(label, t)) for t in result.traces]
         if result.windows is not None:
             drawings.append(("error by start of the window", _map_svg(result)))
         if result.unknown_force is not None:

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from rig_identification import __version__
 from rig_identification.thesis import read_text_remarks
 from rig_identification.thesis_report.figures import Figures
+from rig_identification.thesis_report.sections import add_sections
 from rig_identification.thesis_report.table import ELEMENTS, absolute_elements, case_rows, number
 from rig_identification.thesis_rerun import Rerun
 
@@ -38,4 +39,4 @@ def write_page(found: Rerun, figures: Figures, seconds: float, path: Path) -> No
         tracking=found.tracking,
         remarks=read_text_remarks(),
     )
-    path.write_text(page, encoding="utf-8")
+    path.write_text(add_sections(page, environment, found), encoding="utf-8")

@@ -1,6 +1,7 @@
 """The thesis, rerun: its case studies simulated, and four estimators side by side on each of them."""
 
 from rig_identification.thesis_rerun.comparison import Comparison, compare, signed_error, worst_percent
+from rig_identification.thesis_rerun.integration import IntegratedPose
 from rig_identification.thesis_rerun.motion import CaseMotion, fly_case
 from rig_identification.thesis_rerun.rerun import CaseResult, Rerun, Trace, rerun, rerun_case
 
@@ -8,6 +9,7 @@ __all__ = [
     "CaseMotion",
     "CaseResult",
     "Comparison",
+    "IntegratedPose",
     "Rerun",
     "Trace",
     "compare",

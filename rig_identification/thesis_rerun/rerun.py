@@ -15,13 +15,16 @@ from rig_identification.model.modes import Mode, natural_modes
 from rig_identification.model.motion import rig_model
 from rig_identification.thesis.case import Case, load_case
 from rig_identification.thesis_rerun.comparison import Comparison, compare
+from rig_identification.thesis_rerun.integration import IntegrationCheck, check_integration
 from rig_identification.thesis_rerun.motion import CaseMotion, case_elements, fly_case
 from rig_identification.thesis_rerun.oddities import odd_statements
 from rig_identification.thesis_rerun.output_error import with_noise
 from rig_identification.thesis_rerun.realistic import Realistic, realistic_uncertainty
+from rig_identification.thesis_rerun.statics import StaticRerun, rerun_statics
 from rig_identification.thesis_rerun.tracking import TrackingComparison, compare_tracking
 from rig_identification.thesis_rerun.unknown_force import UnknownForceFit, fit_with_unknown_force
 from rig_identification.thesis_rerun.windows import ConvergenceMap, convergence_map
+from rig_identification.thesis_rerun.wrench import WrenchAccuracy, wrench_accuracy
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -30,6 +33,8 @@ Progress = Callable[[str, float], None]
 DRAWN, DRAWN_RATE = 20.0, 50
 #: Case whose data case 5 uses, and the case and time, s, on which the trackers are compared.
 MAPPED, TRACKED, TRACKED_FOR = 5, 10, 250.0
+#: Case on which the thesis checks its own tracker (section 4.1.1).
+CHECKED = 1
 #: Seed of every simulated noise.
 SEED = 0
 
@@ -53,8 +58,10 @@ class CaseResult:
     least_tension: float  # N
     comparison: Comparison
     realistic: Realistic | None
+    wrench: WrenchAccuracy | None  # of the preprocessor, with the sensors and doubts of ``realistic``
     unknown_force: UnknownForceFit | None
     windows: ConvergenceMap | None
+    integration: IntegrationCheck | None  # chapter 3's tracker, on the case that the thesis checks it on
     modes: tuple[Mode, ...]
     traces: tuple[Trace, ...]
     statements: tuple[str, ...]
@@ -66,6 +73,7 @@ class Rerun:
 
     cases: tuple[CaseResult, ...]
     tracking: TrackingComparison | None
+    statics: StaticRerun | None  # Table 2.1
 
 
 def rerun_case(case: Case) -> CaseResult:
@@ -77,16 +85,21 @@ def rerun_case(case: Case) -> CaseResult:
     if not case.force_measured:
         unknown = fit_with_unknown_force(motion, case.window)
     windows = convergence_map(motion, comparison.momentum.inertia) if case.number == MAPPED else None
+    realistic = realistic_uncertainty(case, SEED)
+    integration = check_integration(motion, SEED) if case.number == CHECKED else None
+    told = () if integration is None else (integration.statement,)
     return CaseResult(
         case,
         motion.least_tension,
         comparison,
-        realistic_uncertainty(case, SEED),
+        realistic,
+        None if realistic is None else wrench_accuracy(motion, realistic.center_std),
         unknown,
         windows,
+        integration,
         modes_of(case),
         _traces(motion, comparison),
-        odd_statements(motion, comparison),
+        told + odd_statements(motion, comparison),
     )
 
 
@@ -98,16 +111,20 @@ def modes_of(case: Case) -> tuple[Mode, ...]:
 
 
 def rerun(cases: tuple[Case, ...], progress: Progress, workers: int = 2, tracking: bool = True) -> Rerun:
-    """Every case of ``cases``, ``workers`` processes at a time; progress(what, fraction done)."""
+    """Every case of ``cases``, ``workers`` processes at a time; progress(what, fraction done).
+
+    tracking: chapters 2 and 3 as well, Table 2.1 and the trackers.
+    """
+    statics = rerun_statics() if tracking else None
     jobs = [(case.number, case.variant) for case in cases]
     if workers < 2 or len(jobs) + tracking < 2:
         found = _in_turn(jobs, progress)
-        return Rerun(found, _track(progress) if tracking else None)
+        return Rerun(found, _track(progress) if tracking else None, statics)
     results: dict[tuple[int, str], CaseResult] = {}
     for label, result in _side_by_side(jobs, tracking, workers, progress):
         results[label] = result
     trackers = results.pop((0, ""), None)
-    return Rerun(tuple(results[job] for job in jobs), trackers)  # type: ignore[arg-type]
+    return Rerun(tuple(results[job] for job in jobs), trackers, statics)  # type: ignore[arg-type]
 
 
 def _in_turn(jobs: list[tuple[int, str]], progress: Progress) -> tuple[CaseResult, ...]:

@@ -20,11 +20,11 @@ from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.launch import SHARE, Launch, launch_state
 from rig_identification.estimate.prediction import model_at, start_basis
 from rig_identification.estimate.track import BLOCK, Track, start_covariance, track, wrench_noise
-from rig_identification.live import strapdown
 from rig_identification.model.motion import RigModel, State
 from rig_identification.recording import Recording, Series, Session
 from rig_identification.simulate import case_spec, simulate_session
 from rig_identification.thesis.case import Case
+from rig_identification.thesis_rerun.integration import integrate
 
 Array = NDArray[np.float64]
 
@@ -175,21 +175,16 @@ def _integrated_error(session: Session, recording: Recording, truth: _Truth) -> 
     rate, force = imu.values[:, :3] @ turn_imu.T, imu.values[:, 3:] @ turn_imu.T
     begin = int(np.searchsorted(imu.time, truth.position.x[0] + 1e-9))
     first = imu.time[begin : begin + 1]
-    R = np.array(truth.turn(first).as_matrix()[0], order="C")
+    R = truth.turn(first).as_matrix()[0]
     arm = np.asarray(rig.imu.position, dtype=float)
-    p = truth.position(first)[0] + R @ arm
-    v = truth.velocity(first)[0] + R @ np.cross(truth.rate(first)[0], arm)
-    bias, P, noise = np.zeros(6), np.zeros((strapdown.ERRORS,) * 2), np.zeros(4)
+    velocity = truth.velocity(first)[0] + R @ np.cross(truth.rate(first)[0], arm)
+    start = (truth.position(first)[0] + R @ arm, R, velocity)
+    last = int(np.searchsorted(imu.time, truth.position.x[-1]))
+    here = slice(begin, last)
+    p, turns = integrate(imu.time[here], rate[here], force[here], start, rig.gravity)
     every = max(1, round(EVERY / float(np.median(np.diff(imu.time)))))
-    last = int(np.searchsorted(imu.time, truth.position.x[-1])) - 1
-    time, position, attitude = [], [], []
-    for k in range(begin, last):
-        dt = float(imu.time[k + 1] - imu.time[k])
-        mean_rate, mean_force = 0.5 * (rate[k] + rate[k + 1]), 0.5 * (force[k] + force[k + 1])
-        strapdown.propagate_sample(p, R, v, bias, P, mean_rate, mean_force, dt, rig.gravity, noise)
-        if (k + 1 - begin) % every == 0:
-            at = imu.time[k + 1]
-            time.append(float(at))
-            position.append(float(np.linalg.norm(truth.position(at) - (p - R @ arm))))
-            attitude.append((Rotation.from_matrix(R).inv() * truth.turn(at)).magnitude())
-    return PoseError(np.array(time), np.array(position), np.array(attitude))
+    compared = slice(every, None, every)
+    time, p, turns = imu.time[here][compared], p[compared], turns[compared]
+    position = np.linalg.norm(truth.position(time) - (p - turns @ arm), axis=1)
+    attitude = (Rotation.from_matrix(turns).inv() * truth.turn(time)).magnitude()
+    return PoseError(time, position, attitude)
