@@ -100,10 +100,13 @@ def case_elements(case: Case, inertia: Array | None = None) -> Array:
     return np.concatenate([[case.mass], case.center_of_mass, six_elements(tensor)])
 
 
-def fly_case(case: Case, *, inertia: Array | None = None, duration: float | None = None) -> CaseMotion:
+def fly_case(
+    case: Case, *, inertia: Array | None = None, duration: float | None = None, agreed: float = AGREED
+) -> CaseMotion:
     """Motion of a case over ``duration`` s (its own length where None), from rest in its initial pose.
 
     inertia (3, 3) kg m^2 in place of the case's: the motion that an identified tensor predicts.
+    agreed: change of force, N, at which the passes over a block end.
     Raises InputError where the motion leaves every bound.
     """
     model = rig_model(case.rig, case_elements(case, inertia), rods=True)
@@ -117,7 +120,7 @@ def fly_case(case: Case, *, inertia: Array | None = None, duration: float | None
     edges = _edges(nodes, jumps)
     for first, last in pairwise(edges):
         here = slice(first, last + 1)
-        motion, plain, given = _block(case, model, state, first, last)
+        motion, plain, given = _block(case, model, state, first, last, agreed)
         held[first] = 0.5 * (held[first] + given[0]) if first in jumps else given[0]
         held[first + 1 : last + 1] = given[1:]
         states[here], rotations[here], out[here] = motion.states, motion.R_world_body, motion.outputs
@@ -152,7 +155,9 @@ def _edges(nodes: int, jumps: NDArray[np.int64]) -> list[int]:
     return edges
 
 
-def _block(case: Case, model: RigModel, state: State, first: int, last: int):  # type: ignore[no-untyped-def]
+def _block(  # type: ignore[no-untyped-def]
+    case: Case, model: RigModel, state: State, first: int, last: int, agreed: float
+):
     """(motion, force (k, 3), force at the nodes that the model interpolates (k, 3)) of one block."""
     time = STEP * np.arange(first, last + 1)
     inside = time.copy()
@@ -167,7 +172,7 @@ def _block(case: Case, model: RigModel, state: State, first: int, last: int):  #
         if not motion.complete:
             raise InputError(f"case {case.label}: the motion leaves every bound at {time[0]:.1f} s")
         turns = motion.R_world_body
-        if np.max(np.abs(force - before)) < AGREED or case.force.axes == "body":
+        if np.max(np.abs(force - before)) < agreed or case.force.axes == "body":
             break
     return motion, force, given
 
