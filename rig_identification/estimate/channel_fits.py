@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.lag import lagged
 from rig_identification.estimate.prediction import Linearised, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
 from rig_identification.estimate.sampling import interpolation
@@ -24,21 +25,18 @@ def node_corrections(linearised: Linearised) -> Array | None:
     return np.asarray(np.einsum("nij,nj->ni", motion.H, states) + np.einsum("nij,nj->ni", motion.D, wrenches))
 
 
-def _clock(problem: Problem, theta: Array, device: str) -> float:
-    entry = problem.bench.parameters.places.clock(device)
-    return 0.0 if entry is None else float(problem.bench.parameters.device(theta)[entry])
-
-
 def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -> list[ChannelFit]:
     """One :class:`ChannelFit` an axis of each channel of a run, sample by sample."""
     corrections = node_corrections(linearised)
+    places, own = problem.bench.parameters.places, problem.bench.parameters.device(theta)
     fits = []
     for channel in run.channels:
         reading = linearised.readings[channel.device]
         nodes = reading.values[:, channel.columns]
         if corrections is not None:
             nodes = nodes + np.einsum("nij,nj->ni", reading.in_raw[:, channel.columns], corrections)
-        late = _clock(problem, theta, channel.device)
+        nodes = lagged(run.grid.step, own[places.lag(channel.device)], nodes)
+        late = own[places.clock(channel.device)]
         each = np.arange(channel.time.size)
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
         fits += _axes(run.recording.name, channel, np.asarray(value @ nodes), run.offset)

@@ -177,8 +177,10 @@ def parameter_estimates(problem: Problem, evaluation: Evaluation) -> tuple[Param
     values = parameters.values(evaluation.point.theta)
     out = []
     for i, p in enumerate(parameters.free):
-        std = p.prior_std * float(np.sqrt(covariance[INERTIAL + i, INERTIAL + i]))
-        out.append(ParameterEstimate(p.name, p.unit, p.nominal, p.prior_std, float(values[i]), std))
+        std = p.slope(evaluation.point.theta[INERTIAL + i]) * float(
+            np.sqrt(covariance[INERTIAL + i, INERTIAL + i])
+        )
+        out.append(ParameterEstimate(p.name, p.unit, p.nominal, p.slope(0.0), float(values[i]), std))
     return tuple(out)
 
 

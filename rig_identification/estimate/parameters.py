@@ -46,6 +46,24 @@ class Parameter:
     kind: str  # "physics": entry of the model's flat array; "device": entry of DeviceLayout's
     index: int
     bounded: bool = True  # the ideal model keeps it within a few of its prior std
+    also: tuple[int, ...] = ()  # further entries that hold the same number
+    ratio: bool = False  # positive: prior_std is that of its logarithm about the nominal's
+
+    def value(self, position: float) -> float:
+        """The number at ``position`` (units of the prior's std) of the optimiser's vector."""
+        if self.ratio:
+            return self.nominal * float(np.exp(self.prior_std * position))
+        return self.nominal + self.prior_std * float(position)
+
+    def position(self, value: float) -> float:
+        """Inverse of :meth:`value`."""
+        if self.ratio:
+            return float(np.log(value / self.nominal) / self.prior_std)
+        return (value - self.nominal) / self.prior_std
+
+    def slope(self, position: float) -> float:
+        """Derivative of :meth:`value`."""
+        return self.prior_std * (self.value(position) if self.ratio else 1.0)
 
 
 @dataclass(frozen=True)
@@ -82,16 +100,22 @@ class DeviceLayout:
     @property
     def size(self) -> int:
         """Length of the flat array."""
-        return self.exciter_clock + 1
+        return self.lag("mocap") + 1
 
-    def clock(self, device: str) -> int | None:
-        """Entry of a device's clock offset; None for the load cells, which keep the time."""
-        return {
+    def clock(self, device: str) -> int:
+        """Entry of a device's clock offset."""
+        fixed = {
             "imu": self.imu + devices.IMU_SIZE,
             "inclinometer": self.inclinometer + devices.INCLINOMETER_SIZE,
             "mocap": self.mocap + devices.MOCAP_SIZE,
             "exciter": self.exciter_clock,
-        }.get(device)
+        }
+        return fixed[device] if device in fixed else self.exciter_clock + 1 + self.cables.index(device)
+
+    def lag(self, device: str) -> int:
+        """Entry of a device's time constant (s) as a first-order low-pass."""
+        order = (*self.cables, "imu", "inclinometer", "mocap")
+        return self.exciter_clock + 1 + len(self.cables) + order.index(device)
 
 
 #: A mount that the description leaves out: position within 10 m, orientation within 1.5 rad.
@@ -224,7 +248,7 @@ class ParameterSet:
         out = np.zeros(self.size)
         out[:INERTIAL] = theta[:INERTIAL]
         for i, p in enumerate(self.free, start=INERTIAL):
-            out[i] = (told.get(p.name, p.nominal) - p.nominal) / p.prior_std
+            out[i] = p.position(told.get(p.name, p.nominal))
         return out
 
     def start(self, elements: Array) -> Array:
@@ -235,9 +259,7 @@ class ParameterSet:
 
     def values(self, theta: Array) -> Array:
         """Free parameters in their own units."""
-        return np.array(
-            [p.nominal + p.prior_std * t for p, t in zip(self.free, theta[INERTIAL:], strict=True)]
-        )
+        return np.array([p.value(t) for p, t in zip(self.free, theta[INERTIAL:], strict=True)])
 
     def physics(self, theta: Array) -> Array:
         """The forward model's flat array."""
@@ -245,7 +267,7 @@ class ParameterSet:
         physics[layout.INERTIAL : layout.INERTIAL + INERTIAL] = linear_from_log_cholesky(theta[:INERTIAL])
         for p, value in zip(self.free, self.values(theta), strict=True):
             if p.kind == "physics":
-                physics[p.index] = value
+                physics[[p.index, *p.also]] = value
         tilt = physics[layout.GRAVITY : layout.GRAVITY + 2]
         gravity = -self.model.physics[layout.GRAVITY + 2]
         physics[layout.GRAVITY + 2] = -np.sqrt(gravity**2 - tilt @ tilt)
@@ -256,13 +278,13 @@ class ParameterSet:
         device = np.zeros(self.places.size)
         for p, value in zip(self.free, self.values(theta), strict=True):
             if p.kind == "device":
-                device[p.index] = value
+                device[[p.index, *p.also]] = value
         return device
 
     def directions(self) -> NDArray[np.int64]:
         """Entries of ``physics`` that any parameter moves, and the exciter's clock where it is free."""
         moved = set(range(layout.INERTIAL, layout.INERTIAL + INERTIAL))
-        moved |= {p.index for p in self.free if p.kind == "physics"}
+        moved |= {entry for p in self.free if p.kind == "physics" for entry in (p.index, *p.also)}
         if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
             moved.add(layout.GRAVITY + 2)
         clock = [EXCITER_CLOCK] if any(p.name == "exciter.clock" for p in self.free) else []
@@ -279,7 +301,8 @@ class ParameterSet:
         physics = self.physics(theta)
         for column, p in enumerate(self.free, start=INERTIAL):
             if p.kind == "physics":
-                out[row_of[p.index], column] = p.prior_std
+                for entry in (p.index, *p.also):
+                    out[row_of[entry], column] = p.slope(theta[column])
                 if layout.GRAVITY <= p.index < layout.GRAVITY + 2:
                     slope = -physics[p.index] / physics[layout.GRAVITY + 2]
                     out[row_of[layout.GRAVITY + 2], column] = p.prior_std * slope
@@ -289,7 +312,12 @@ class ParameterSet:
 
     def device_columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(columns of the vector, entries of ``device``, scale) of the device parameters."""
-        rows = [(INERTIAL + i, p.index, p.prior_std) for i, p in enumerate(self.free) if p.kind == "device"]
+        rows = [
+            (INERTIAL + i, entry, p.prior_std)
+            for i, p in enumerate(self.free)
+            if p.kind == "device"
+            for entry in (p.index, *p.also)
+        ]
         columns = np.array([r[0] for r in rows], dtype=np.int64)
         entries = np.array([r[1] for r in rows], dtype=np.int64)
         return columns, entries, np.array([r[2] for r in rows])

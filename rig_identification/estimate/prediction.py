@@ -10,6 +10,7 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.lag import lagged
 from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
 from rig_identification.estimate.sampling import interpolation, jumps_of, node_values, rate_of_change
 from rig_identification.estimate.whitening import smooth, whiten
@@ -161,32 +162,33 @@ def _channel_rows(
 ) -> tuple[Array, Array, Array, Array]:
     """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, X), D (g, w, 6))."""
     parameters = bench.parameters
-    late, clock = 0.0, parameters.places.clock(channel.device)
-    if clock is not None:
-        late = own[clock]
+    clock, lag = parameters.places.clock(channel.device), parameters.places.lag(channel.device)
+    late, tau = own[clock], own[lag]
     groups = channel.node.size
     value, slope = interpolation(run.grid, channel.time - late, channel.group, groups)
     columns = channel.columns
-    predicted = value @ reading.values[:, columns]
+    values = lagged(run.grid.step, tau, reading.values[:, columns])
+    predicted = value @ values
     residual = channel.grouped - predicted
     _, _, motion_H, motion_D, motion_J = motion.derivatives
     starts = motion_J.shape[2]
     in_raw = reading.in_raw[:, columns]
     nodes, width = in_raw.shape[:2]
-    total = (in_raw @ motion_J).reshape(nodes, width * starts)
+    total = lagged(run.grid.step, tau, (in_raw @ motion_J).reshape(nodes, width * starts))
     jacobian = (value @ total).reshape(groups, width, starts)
     device_columns, entries, scale = parameters.device_columns()
     first = device_start(parameters.places, channel.device)
     size = reading.in_device.shape[2]
     own_columns = np.zeros((groups, width, parameters.size))
-    own_map = (value @ reading.in_device[:, columns].reshape(nodes, width * size)).reshape(
-        groups, width, size
-    )
+    in_device = lagged(run.grid.step, tau, reading.in_device[:, columns].reshape(nodes, width * size))
+    own_map = (value @ in_device).reshape(groups, width, size)
     for column, entry, s in zip(device_columns, entries, scale, strict=True):
         if first <= entry < first + size:
-            own_columns[:, :, column] = s * own_map[:, :, entry - first]
-        elif clock is not None and entry == clock:
-            own_columns[:, :, column] = -s * (slope @ reading.values[:, columns])
+            own_columns[:, :, column] += s * own_map[:, :, entry - first]
+        elif entry == clock:
+            own_columns[:, :, column] -= s * (slope @ values)
+        elif entry == lag:
+            own_columns[:, :, column] -= s * (slope @ lagged(run.grid.step, tau, values))
     H = in_raw[channel.node] @ motion_H[channel.node]
     D = in_raw[channel.node] @ motion_D[channel.node]
     return residual, np.concatenate([jacobian, own_columns], axis=2), H, D

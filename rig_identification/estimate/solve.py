@@ -30,12 +30,15 @@ from rig_identification.estimate.rest_evidence import (
     linearise_rest,
     with_dummy,
 )
+from rig_identification.model import layout
 from rig_identification.model.equilibrium import settle
 from rig_identification.model.motion import State, on_cables
 
 Array = NDArray[np.float64]
 
 
+#: Where an internal coordinate may start (m) and how fast (m/s): one standard deviation about its rest.
+INTERNAL_START = (0.1, 0.3)
 #: No entry of the log-Cholesky vector moves further in one step, in units of its weak prior's std.
 LONGEST_STEP = 0.5
 
@@ -131,13 +134,22 @@ def _assemble(
     p = problem.bench.parameters.size
     cost, prior, prior_gradient = _prior(problem, point.theta)
     total = p + sum(r.jacobian.shape[1] - p for r in runs)
+    inner = model_at(problem.bench.parameters, point.theta).states - layout.BODY_STATE
     information, gradient = np.zeros((total, total)), np.zeros(total)
     information[:p, :p] = prior
     gradient[:p] = prior_gradient
     place = p
-    for run in runs:
+    for run, start in zip(runs, point.starts, strict=True):
         starts = run.jacobian.shape[1] - p
         columns = np.concatenate([np.arange(p), np.arange(place, place + starts)])
+        if inner:
+            # Nothing else may tell where a mass that hardly shows starts from
+            last = np.arange(place + starts - inner, place + starts)
+            spread = np.repeat(INTERNAL_START, inner // 2)
+            away = start.vector(layout.BODY_STATE + inner)[layout.BODY_STATE :]
+            information[last, last] += (START_UNIT / spread) ** 2
+            gradient[last] -= START_UNIT * away / spread**2
+            cost += 0.5 * float(np.sum((away / spread) ** 2))
         information[np.ix_(columns, columns)] += run.jacobian.T @ run.jacobian
         gradient[columns] += run.jacobian.T @ run.residual
         cost += run.cost

@@ -6,9 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rig_identification.estimate.parameters import Parameter
+from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.model.motion import RigModel
 
 #: Name in result.json -> (value, std, unit) of a fitted candidate's parameters.
 Told = dict[str, tuple[float, float, str]]
+
+#: What an effect makes of a rig's model, and its parameters there.
+Build = Callable[[RigModel], tuple[RigModel, tuple[Parameter, ...]]]
 
 
 @dataclass(frozen=True)
@@ -23,12 +28,21 @@ class Candidate:
     positive: bool = False  # the first parameter cannot be negative
     tell: Callable[[dict[str, float], dict[str, float]], Told] | None = None  # from values and stds by name
     name_in_result: str = ""  # of the first parameter, where ``tell`` is not given
+    build: Build | None = None  # where the effect changes more than numbers
+    #: Start states that suit the changed model, from a fit without it
+    settle: Callable[[Problem, Point, Evaluation], Point] | None = None
+    #: The kind of thing; effects of one family are told apart by evidence, not by how they look
+    experiment: str = ""  # what would tell it from its rivals
 
     @property
     def label(self) -> str:
         """Short name for progress and notes."""
         place = " ".join(str(v) for v in self.where.values() if isinstance(v, str))
         return f"{self.effect} {place}".strip()
+
+    def built(self, model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        """The model with the effect in it and the effect's parameters there."""
+        return (model, self.parameters) if self.build is None else self.build(model)
 
     def told(self, values: dict[str, float], stds: dict[str, float]) -> Told:
         """The parameters as the contract names them."""

@@ -10,11 +10,13 @@ import numpy as np
 from rig_identification.estimate.growing import fit_start_growing
 from rig_identification.estimate.identify import ORDINARY, Fitted, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.segments import solve_in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
 from rig_identification.estimate.verdict import judge
 from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import MOST_EFFECTS, Trial, catalogue, trials
+from rig_identification.model.equilibrium import find_rest
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
@@ -78,14 +80,22 @@ def explain(ideal: Fitted, verdict: Mismatch, careful: Evaluation | None, notify
 def _whole(ideal: Fitted, problem: Problem, found: list[Trial], rivals: list[dict[str, object]]) -> Explained:
     """Fit the whole runs with the effects found, and predict the held-out ones."""
     last = found[-1]
-    whole = extended(problem, tuple(p for t in found for p in t.candidate.parameters))
+    whole = extended(problem, tuple(t.candidate for t in found))
     point = carried(whole, last.problem, last.evaluation.point)
-    starts = tuple(launch_state(whole.bench, run, point.theta, ideal.rest) for run in whole.runs)
+    rest = find_rest(model_at(whole.bench.parameters, point.theta), (*point.rest_guesses, *point.starts)[0]).state
+    begun = {
+        (run.recording.name, run.offset): state
+        for run, state in zip(last.problem.runs, point.starts, strict=True)
+    }
+    starts = tuple(
+        begun.get((run.recording.name, run.offset)) or launch_state(whole.bench, run, point.theta, rest)
+        for run in whole.runs
+    )
     point = Point(point.theta, starts, point.rest_guesses)
     evaluation, converged = solve(whole, point, iterations=20)
     held_runs, held = [], []
     for run in ideal.holdout_runs:
-        state = launch_state(whole.bench, run, evaluation.point.theta, ideal.rest)
+        state = launch_state(whole.bench, run, evaluation.point.theta, rest)
         result = fit_start_growing(whole.bench, run, evaluation.point.theta, state)
         if result is not None:
             held_runs.append(run)

@@ -4,7 +4,8 @@ The model is linearised once with every candidate's parameters among its columns
 adding a set S of parameters then promises a gain in log posterior of
     1/2 g^T (F + P_S)^-1 g   less the same without S
 (a score test, Rao 1948, with priors; F: Fisher information, g: gradient, P_S: prior
-precisions with S's wide ones). It costs one small linear solve a candidate.
+precisions with S's wide ones). It costs one small linear solve a candidate. Riders, of which
+many frequencies and directions are tried, add columns of their own (response.py).
 """
 
 from __future__ import annotations
@@ -13,12 +14,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
-from rig_identification.estimate.parameters import INERTIAL, Parameter
+from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.response import whitened_response
+from rig_identification.mismatch.riders import SWINGS, WIDTH, middle_of, rider_candidate, rider_wrenches
+from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate
 from rig_identification.model.effects import place
-from rig_identification.model.layout import effects_offset
+from rig_identification.model.layout import RIGID, effects_offset
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -46,10 +52,13 @@ def with_reference(problem: Problem, rest: State) -> Problem:
     return replace(problem, bench=replace(problem.bench, parameters=replace(parameters, model=model)))
 
 
-def extended(problem: Problem, parameters: tuple[Parameter, ...]) -> Problem:
-    """The same problem with further parameters free."""
-    bench = replace(problem.bench, parameters=problem.bench.parameters.having(parameters))
-    return replace(problem, bench=bench)
+def extended(problem: Problem, candidates: tuple[Candidate, ...]) -> Problem:
+    """The same problem with the parameters of ``candidates`` free, and what they change in its model."""
+    parameters = problem.bench.parameters
+    for candidate in candidates:
+        model, own = candidate.built(parameters.model)
+        parameters = replace(parameters, model=model).having(own)
+    return replace(problem, bench=replace(problem.bench, parameters=parameters))
 
 
 def carried(problem: Problem, other: Problem, point: Point) -> Point:
@@ -58,59 +67,142 @@ def carried(problem: Problem, other: Problem, point: Point) -> Point:
     return replace(point, theta=theta)
 
 
-def _all_parameters(candidates: list[Candidate], problem: Problem) -> tuple[Parameter, ...]:
+def _adding(problem: Problem, candidates: list[Candidate]) -> Problem:
+    """The problem with what candidates add free, each with its own prior; what they only free stays."""
     have = {p.name for p in problem.bench.parameters.free}
-    new: dict[str, Parameter] = {}
+    parameters = problem.bench.parameters
     for candidate in candidates:
-        for p in candidate.parameters:
-            if p.name not in have:
-                new[p.name] = p
-    return tuple(new.values())
+        model, own = candidate.built(parameters.model)
+        new = tuple(p for p in own if p.name not in have)
+        have |= {p.name for p in new}
+        parameters = replace(parameters, model=model).having(new)
+    return replace(problem, bench=replace(problem.bench, parameters=parameters))
 
 
-def screen(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]) -> list[Promise]:
-    """Promises of all candidates about ``evaluation``, best first."""
-    wide = extended(problem, _all_parameters(candidates, problem))
+def screen(problem: Problem, evaluation: Evaluation, candidates: list[Candidate], mass: float) -> list[Promise]:
+    """Promises of all candidates, and of riders and supports, about ``evaluation``, best first.
+
+    mass: kg, of the body.
+    """
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    rigid = model.internal == 0 and bool(np.all(model.modes == RIGID))
+    probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in range(3)] if rigid else []
+    wide = _adding(problem, [*candidates, *probes])
     point = carried(wide, problem, evaluation.point)
     full = evaluate(wide, point)
     if full is None:
         return []
-    free = wide.bench.parameters.free
-    added = {q.name for q in free} - {q.name for q in problem.bench.parameters.free}
-    column = {q.name: INERTIAL + i for i, q in enumerate(free)}
-    theta = point.theta
+    added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
+    base = _base(wide, point, full, added, wide.bench.parameters.model.states - model.states)
+    out = [_promise(wide, point, full, base, c) for c in candidates]
+    for probe in (_promise(wide, point, full, base, c) for c in probes):
+        out += _supports(problem, mass, probe)
+    out += _riders(problem, full, base, wide.bench.parameters.size, mass)
+    return sorted(out, key=lambda promise: -promise.gain)
+
+
+def _base(
+    wide: Problem, point: Point, full: Evaluation, added: set[str], probed: int
+) -> NDArray[np.int64]:
+    """Unknowns that are free without any candidate. probed: states that probes add."""
     at_bound = np.zeros(full.information.shape[0], dtype=bool)
-    for i, q in enumerate(free, start=INERTIAL):
+    for i, q in enumerate(wide.bench.parameters.free, start=INERTIAL):
         if q.name in added:
             at_bound[i] = True
-        elif q.bounded and abs(theta[i]) > problem.bound - 1e-6:
+        elif q.bounded and abs(point.theta[i]) > wide.bound - 1e-6:
             # Pressed against its bound: it moves only where it is freed
-            at_bound[i] = theta[i] * full.gradient[i] > 0.0
-    base = np.flatnonzero(~at_bound)
-    out = []
-    plain = _gain(full.information, full.gradient, base)
-    for candidate in candidates:
-        information, gradient = full.information.copy(), full.gradient.copy()
-        chosen, scale = [], {}
-        for q in candidate.parameters:
-            i = column[q.name]
-            chosen.append(i)
-            own = free[i - INERTIAL]
-            ratio = own.prior_std / q.prior_std
-            # Replace the prior: precision 1 in the old units becomes ratio^2
-            information[i, i] += ratio**2 - 1.0
-            gradient[i] += theta[i] * (1.0 - ratio**2)
-            scale[q.name] = own
-        index = np.unique(np.concatenate([base, np.array(chosen, dtype=base.dtype)]))
-        step = np.zeros(information.shape[0])
-        step[index] = _solve(information[np.ix_(index, index)], gradient[index])
-        gain = 0.5 * float(step[index] @ gradient[index]) - plain
-        values = {
-            name: own.nominal + own.prior_std * float(theta[column[name]] + step[column[name]])
-            for name, own in scale.items()
-        }
-        out.append(Promise(candidate, gain, values))
-    return sorted(out, key=lambda promise: -promise.gain)
+            at_bound[i] = point.theta[i] * full.gradient[i] > 0.0
+    end = wide.bench.parameters.size
+    for run in full.runs:
+        end += run.jacobian.shape[1] - wide.bench.parameters.size
+        at_bound[end - probed : end] = True
+    return np.flatnonzero(~at_bound)
+
+
+def _promise(
+    wide: Problem, point: Point, full: Evaluation, base: NDArray[np.int64], candidate: Candidate
+) -> Promise:
+    free = wide.bench.parameters.free
+    column = {q.name: INERTIAL + i for i, q in enumerate(free)}
+    information, gradient = full.information.copy(), full.gradient.copy()
+    chosen = []
+    for q in candidate.parameters:
+        i = column[q.name]
+        chosen.append(i)
+        ratio = free[i - INERTIAL].prior_std / q.prior_std
+        # Replace the prior: precision 1 in the old units becomes ratio^2
+        information[i, i] += ratio**2 - 1.0
+        gradient[i] += point.theta[i] * (1.0 - ratio**2)
+    index = np.unique(np.concatenate([base, np.array(chosen, dtype=base.dtype)]))
+    step = np.zeros(information.shape[0])
+    step[index] = _solve(information[np.ix_(index, index)], gradient[index])
+    gain = 0.5 * float(step[index] @ gradient[index]) - _gain(full.information, full.gradient, base)
+    values = {q.name: free[i - INERTIAL].value(point.theta[i] + step[i]) for q, i in _with(candidate, column)}
+    return Promise(candidate, gain, values)
+
+
+def _with(candidate: Candidate, column: dict[str, int]):  # type: ignore[no-untyped-def]
+    return [(q, column[q.name]) for q in candidate.parameters]
+
+
+def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
+    """What a ceiling's probe promises of a ceiling, and the vertical one of cables that stretch."""
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    name, compliance = next(iter(probe.values.items()))
+    if compliance <= 0.0:
+        return []
+    axis = "xyz".index(name[-1])
+    out = [Promise(ceiling_candidate(rig, model, mass, axis), probe.gain, probe.values)]
+    if axis == 2:
+        length = float(np.mean([c.length for c in rig.cables]))
+        stiffness = length / (compliance * model.cables)
+        out.append(Promise(cable_elasticity(rig, model, mass, stiffness), probe.gain, {}))
+    return out
+
+
+def _riders(
+    problem: Problem, full: Evaluation, base: NDArray[np.int64], size: int, mass: float
+) -> list[Promise]:
+    """The best swing of each direction."""
+    wrenches = rider_wrenches(problem, full)
+    count = WIDTH * len(SWINGS)
+    total = full.information.shape[0]
+    cross, own, gradient = np.zeros((total, count)), np.zeros((len(SWINGS), WIDTH, WIDTH)), np.zeros(count)
+    place_ = size
+    for i, run in enumerate(full.runs):
+        columns = whitened_response(run, wrenches[i])
+        starts = run.jacobian.shape[1] - size
+        rows = np.concatenate([np.arange(size), np.arange(place_, place_ + starts)])
+        cross[rows] += run.jacobian.T @ columns
+        gradient += columns.T @ run.residual
+        for k in range(len(SWINGS)):
+            mine = columns[:, WIDTH * k : WIDTH * (k + 1)]
+            own[k] += mine.T @ mine
+        place_ += starts
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[base], 1e-300))
+    inside = full.information[np.ix_(base, base)] * np.outer(scale, scale)
+    factor = cho_factor(inside + 1e-12 * np.eye(base.size))
+    seen = scale[:, None] * cross[base]
+    solved = cho_solve(factor, seen)
+    left = gradient - solved.T @ (scale * full.gradient[base])
+    center = middle_of(problem.bench.rig)
+    far = float(np.max(extent(problem.bench.rig)))
+    prior = np.diag([1.0 / (0.05 * mass) ** 2] + [1.0 / (0.05 * mass * far) ** 2] * 3)
+    best: dict[str, Promise] = {}
+    for k, swing in enumerate(SWINGS):
+        mine = slice(WIDTH * k, WIDTH * (k + 1))
+        matrix = own[k] - seen[:, mine].T @ solved[:, mine] + prior
+        step = np.linalg.lstsq(matrix, left[mine], rcond=1e-12)[0]
+        gain = 0.5 * float(step @ left[mine])
+        if step[0] <= 0.0 or (swing.directions in best and gain <= best[swing.directions].gain):
+            continue
+        at = center + np.clip(step[1:] / step[0] - center, -far, far)
+        # Along its own direction a rider's place tells little
+        for axis in swing.directions if len(swing.directions) == 1 else "":
+            at["xyz".index(axis)] = center["xyz".index(axis)]
+        candidate, values = rider_candidate(problem, swing, mass, float(step[0]), at)
+        best[swing.directions] = Promise(candidate, gain, values)
+    return list(best.values())
 
 
 def _solve(information: Array, gradient: Array) -> Array:

@@ -20,6 +20,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.rig_errors import rig_errors
+from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.sensor_errors import sensor_errors
 
@@ -62,6 +63,11 @@ def catalogue(problem: Problem) -> list[Candidate]:
     ]
 
 
+def mass_of(problem: Problem, evaluation: Evaluation) -> float:
+    """Mass of the body as fitted, kg."""
+    return float(problem.bench.parameters.elements(evaluation.point.theta)[0])
+
+
 def needed_gain(candidate: Candidate, count: int) -> float:
     """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks, Bonferroni)."""
     return 0.5 * float(chi2.isf(FALSE_ALARM / count, len(candidate.parameters)))
@@ -80,18 +86,22 @@ def log_evidence(evaluation: Evaluation) -> float:
 def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial | None:
     """Fit one hypothesis from what screening promised; None where its sign makes no sense."""
     candidate = promise.candidate
-    wide = extended(problem, candidate.parameters)
+    wide = extended(problem, (candidate,))
     point = carried(wide, problem, evaluation.point)
     theta = point.theta.copy()
-    for p in candidate.parameters:
+    for k, p in enumerate(candidate.built(problem.bench.parameters.model)[1]):
+        if p.name not in promise.values:
+            continue
         i = wide.bench.parameters.index_of(p.name)
-        theta[i] = float(np.clip((promise.values[p.name] - p.nominal) / p.prior_std, -1.0, 1.0))
-        if candidate.positive:
+        theta[i] = float(np.clip(p.position(promise.values[p.name]), -1.0, 1.0))
+        if candidate.positive and k == 0:
             theta[i] = max(theta[i], 0.0)
+    if candidate.settle is not None:
+        point = candidate.settle(wide, replace(point, theta=theta), evaluation)
     try:
         fitted, _ = solve(wide, replace(point, theta=theta), iterations=10, tolerance=0.05)
     except FloatingPointError:
-        fitted, _ = solve(wide, point, iterations=10, tolerance=0.05)
+        return None
     if candidate.positive:
         i = wide.bench.parameters.index_of(candidate.parameters[0].name)
         if fitted.point.theta[i] <= 0.0:
@@ -121,8 +131,8 @@ def trials(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate], limit: float, notify: Notify
 ) -> list[Trial]:
     """Full fits of the most promising hypotheses, most likely first."""
-    promises = screen(problem, evaluation, candidates)
-    worthy = [p for p in promises if p.gain > needed_gain(p.candidate, len(candidates))]
+    promises = screen(problem, evaluation, candidates, mass_of(problem, evaluation))
+    worthy = [p for p in promises if p.gain > needed_gain(p.candidate, len(candidates) + len(SWINGS))]
     if not worthy:
         return []
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}

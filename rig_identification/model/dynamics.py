@@ -93,25 +93,13 @@ def rotation_rate(x, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[no-untyped-def]
-    """Fill K (6 + n + s, 6 + n + s) and r (6 + n + s,) of K z = r, with s internal coordinates.
-
-    physics: flat array of layout.py. modes (n,): see layout.py. mount (3, 3):
-    described orientation of the exciter frame in body. x: local state. R (3, 3): pose.
-    force (3,): measured exciter force, exciter frame, N. wrench (6,): further force N and
-    moment about the datum N m, body axes.
-    """
-    n = modes.shape[0]
+def add_body(physics, x, R, K, r):  # type: ignore[no-untyped-def]
+    """Fill the body's own rows of K and r, which are zero: inertia, gyroscopic terms, weight."""
     m = physics[INERTIAL]
     hx, hy, hz = physics[INERTIAL + 1], physics[INERTIAL + 2], physics[INERTIAL + 3]
     ixx, ixy, ixz = physics[INERTIAL + 4], physics[INERTIAL + 5], physics[INERTIAL + 6]
     iyy, iyz, izz = physics[INERTIAL + 7], physics[INERTIAL + 8], physics[INERTIAL + 9]
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
-    size = r.shape[0]
-    for i in range(size):
-        r[i] = 0.0
-        for j in range(size):
-            K[i, j] = 0.0
     K[0, 0] = m
     K[1, 1] = m
     K[2, 2] = m
@@ -153,80 +141,86 @@ def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[
     r[3] = hy * gz - hz * gy - (wy * lz - wz * ly)
     r[4] = hz * gx - hx * gz - (wz * lx - wx * lz)
     r[5] = hx * gy - hy * gx - (wx * ly - wy * lx)
-    for i in range(6):
-        r[i] += wrench[i]
-    _add_exciter(physics, mount, force, r)
-    # Cables see the body from their upper hinges, which a yielding ceiling moves
-    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
-    v0, v1, v2 = x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2
-    vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
-    vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2
-    vz = R[0, 2] * v0 + R[1, 2] * v1 + R[2, 2] * v2
-    for i in range(n):
-        o = CABLES + CABLE_SIZE * i
-        row = 6 + i
-        if modes[i] == SLACK:
-            K[row, row] = 1.0
-            continue
-        bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-        d0 = physics[o + CEILING_POINT] + s0 - x[0]
-        d1 = physics[o + CEILING_POINT + 1] + s1 - x[1]
-        d2 = physics[o + CEILING_POINT + 2] + s2 - x[2]
-        dx = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 - bx
-        dy = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 - by
-        dz = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 - bz
-        length = root(dx * dx + dy * dy + dz * dz)
-        per_length = reciprocal(length)
-        ux, uy, uz = dx * per_length, dy * per_length, dz * per_length
-        mx = by * uz - bz * uy
-        my = bz * ux - bx * uz
-        mz = bx * uy - by * ux
-        K[0, row] = -ux
-        K[1, row] = -uy
-        K[2, row] = -uz
-        K[3, row] = -mx
-        K[4, row] = -my
-        K[5, row] = -mz
-        if size > 6 + n:
-            add_ceiling(physics, n, x, R, i, ux, uy, uz, modes[i] == RIGID, K)
-        # w x b; s: velocity of the body hinge
-        ex = wy * bz - wz * by
-        ey = wz * bx - wx * bz
-        ez = wx * by - wy * bx
-        sx, sy, sz = vx + ex, vy + ey, vz + ez
-        along = ux * sx + uy * sy + uz * sz
-        if modes[i] == RIGID:
-            K[row, 0] = -ux
-            K[row, 1] = -uy
-            K[row, 2] = -uz
-            K[row, 3] = -mx
-            K[row, 4] = -my
-            K[row, 5] = -mz
-            # Softness at acceleration level: zero but where more cables than needed hold the body
-            K[row, row] = -physics[CABLES + CABLE_SIZE * n + SHARING]
-            r[row] = (
-                ux * (wy * ez - wz * ey)
-                + uy * (wz * ex - wx * ez)
-                + uz * (wx * ey - wy * ex)
-                - (sx * sx + sy * sy + sz * sz - along * along) * per_length
-            )
-        else:
-            unloaded = physics[o + LENGTH]
-            K[row, row] = 1.0
-            tension = (
-                physics[o + AXIAL_STIFFNESS]
-                * reciprocal(unloaded)
-                * (length - unloaded - physics[o + AXIAL_DAMPING] * along)
-            )
-            if modes[i] == ELASTIC and (tension.real < 0.0 or length.real < unloaded.real):
-                r[row] = 0.0
-            else:
-                r[row] = tension
-    add_effects(physics, modes, x, R, K, r)
 
 
 @njit(cache=True)
-def _add_exciter(physics, mount, force, r):  # type: ignore[no-untyped-def]
+def add_cable(physics, i, modes, x, R, K, r):  # type: ignore[no-untyped-def]
+    """Fill cable i's row and column of K and its entry of r, which are zero."""
+    n = modes.shape[0]
+    size = r.shape[0]
+    o = CABLES + CABLE_SIZE * i
+    wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
+    p0, p1, p2 = x[0], x[1], x[2]
+    v0, v1, v2 = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
+    if size > 6 + n:
+        # Cables see the body from their upper hinges, which a yielding ceiling moves
+        s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
+        p0, p1, p2, v0, v1, v2 = p0 - s0, p1 - s1, p2 - s2, v0 - c0, v1 - c1, v2 - c2
+    vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
+    vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2
+    vz = R[0, 2] * v0 + R[1, 2] * v1 + R[2, 2] * v2
+    row = 6 + i
+    if modes[i] == SLACK:
+        K[row, row] = 1.0
+        return
+    bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
+    d0 = physics[o + CEILING_POINT] - p0
+    d1 = physics[o + CEILING_POINT + 1] - p1
+    d2 = physics[o + CEILING_POINT + 2] - p2
+    dx = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 - bx
+    dy = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 - by
+    dz = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 - bz
+    length = root(dx * dx + dy * dy + dz * dz)
+    per_length = reciprocal(length)
+    ux, uy, uz = dx * per_length, dy * per_length, dz * per_length
+    mx = by * uz - bz * uy
+    my = bz * ux - bx * uz
+    mz = bx * uy - by * ux
+    K[0, row] = -ux
+    K[1, row] = -uy
+    K[2, row] = -uz
+    K[3, row] = -mx
+    K[4, row] = -my
+    K[5, row] = -mz
+    if size > 6 + n:
+        add_ceiling(physics, n, x, R, i, ux, uy, uz, modes[i] == RIGID, K)
+    # w x b; s: velocity of the body hinge
+    ex = wy * bz - wz * by
+    ey = wz * bx - wx * bz
+    ez = wx * by - wy * bx
+    sx, sy, sz = vx + ex, vy + ey, vz + ez
+    along = ux * sx + uy * sy + uz * sz
+    if modes[i] == RIGID:
+        K[row, 0] = -ux
+        K[row, 1] = -uy
+        K[row, 2] = -uz
+        K[row, 3] = -mx
+        K[row, 4] = -my
+        K[row, 5] = -mz
+        # Softness at acceleration level: zero but where more cables than needed hold the body
+        K[row, row] = -physics[CABLES + CABLE_SIZE * n + SHARING]
+        r[row] = (
+            ux * (wy * ez - wz * ey)
+            + uy * (wz * ex - wx * ez)
+            + uz * (wx * ey - wy * ex)
+            - (sx * sx + sy * sy + sz * sz - along * along) * per_length
+        )
+    else:
+        unloaded = physics[o + LENGTH]
+        K[row, row] = 1.0
+        tension = (
+            physics[o + AXIAL_STIFFNESS]
+            * reciprocal(unloaded)
+            * (length - unloaded - physics[o + AXIAL_DAMPING] * along)
+        )
+        if modes[i] == ELASTIC and (tension.real < 0.0 or length.real < unloaded.real):
+            r[row] = 0.0
+        else:
+            r[row] = tension
+
+
+@njit(cache=True)
+def add_exciter(physics, mount, force, r):  # type: ignore[no-untyped-def]
     """Exciter force (measured, exciter frame) at its mount; the mount's rotation error to second order."""
     gain = physics[EXCITER_GAIN]
     f0 = gain * (mount[0, 0] * force[0] + mount[0, 1] * force[1] + mount[0, 2] * force[2])
@@ -246,3 +240,26 @@ def _add_exciter(physics, mount, force, r):  # type: ignore[no-untyped-def]
     r[3] += py * fz - pz * fy
     r[4] += pz * fx - px * fz
     r[5] += px * fy - py * fx
+
+
+@njit(cache=True)
+def assemble(physics, modes, mount, x, R, force, wrench, K, r):  # type: ignore[no-untyped-def]
+    """Fill K (6 + n + s, 6 + n + s) and r (6 + n + s,) of K z = r, with s internal coordinates.
+
+    physics: flat array of layout.py. modes (n,): see layout.py. mount (3, 3):
+    described orientation of the exciter frame in body. x: local state. R (3, 3): pose.
+    force (3,): measured exciter force, exciter frame, N. wrench (6,): further force N and
+    moment about the datum N m, body axes.
+    """
+    size = r.shape[0]
+    for i in range(size):
+        r[i] = 0.0
+        for j in range(size):
+            K[i, j] = 0.0
+    add_body(physics, x, R, K, r)
+    for i in range(6):
+        r[i] += wrench[i]
+    add_exciter(physics, mount, force, r)
+    for i in range(modes.shape[0]):
+        add_cable(physics, i, modes, x, R, K, r)
+    add_effects(physics, modes, x, R, K, r)

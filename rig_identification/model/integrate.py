@@ -21,14 +21,25 @@ from rig_identification.model.constraints import (
     project_state,
     update_reference,
 )
-from rig_identification.model.dynamics import assemble, rotation, rotation_rate
+from rig_identification.model.dynamics import (
+    add_body,
+    add_cable,
+    add_exciter,
+    assemble,
+    rotation,
+    rotation_rate,
+)
+from rig_identification.model.effects.all import add_effects, effects_reach
 from rig_identification.model.effects.cable_mass import weight_below_cell
 from rig_identification.model.effects.internal import ceiling_shift
+from rig_identification.model.effects.place import LINEAR_DENSITY
 from rig_identification.model.layout import (
     BODY_STATE,
     CABLE_SIZE,
     CABLES,
+    EXCITER_POSITION,
     GRAVITY,
+    INERTIAL,
     LENGTH,
     OUT_ANGULAR_ACCELERATION,
     OUT_GRAVITY,
@@ -67,6 +78,70 @@ def solve(physics, modes, mount, x, R, force, wrench, K, r, inverse, z):  # type
 
 
 @njit(cache=True, nogil=True)
+def _defect_in(physics, modes, mount, direction, reach, x, R, force, K, r, z, change):  # type: ignore[no-untyped-def]
+    """change (6 + n + s,): derivative of r - K z in physics[direction], z held.
+
+    The equations are a sum of parts, and only those that hold the number are written out.
+    """
+    air, gravity, rotor, hinged = reach
+    n, size = modes.shape[0], r.shape[0]
+    bodily = direction == EXCITER_CLOCK or direction < CABLES
+    effects = direction >= CABLES + CABLE_SIZE * n
+    for i in range(size):
+        r[i] = 0.0
+        change[i] = 0.0
+    if bodily:
+        for i in range(6):
+            for j in range(6):
+                K[i, j] = 0.0
+        if direction == EXCITER_CLOCK or direction >= EXCITER_POSITION:
+            add_exciter(physics, mount, force, r)
+            effects = rotor and direction != EXCITER_CLOCK
+        else:
+            add_body(physics, x, R, K, r)
+            effects = gravity if direction < INERTIAL else air
+        for i in range(6):
+            total = r[i].imag
+            for j in range(6):
+                total -= K[i, j].imag * z[j]
+            change[i] = total / STEP
+    elif not effects and size == 6 + n:
+        cable = (direction - CABLES) // CABLE_SIZE
+        row = 6 + cable
+        for j in range(size):
+            K[row, j] = 0.0
+        add_cable(physics, cable, modes, x, R, K, r)
+        total = r[row].imag - K[row, row].imag * z[row]
+        for j in range(6):
+            total -= K[row, j].imag * z[j]
+            change[j] = -K[j, row].imag * z[row] / STEP
+        change[row] = total / STEP
+        effects = hinged
+    else:
+        # A ceiling's numbers and the softness of redundant cables stand in all cables' rows
+        K[:, :] = 0.0
+        for i in range(n):
+            add_cable(physics, i, modes, x, R, K, r)
+        _add_defect(K, r, z, change)
+        effects = effects or hinged
+    if effects:
+        K[:, :] = 0.0
+        r[:] = 0.0
+        add_effects(physics, modes, x, R, K, r)
+        _add_defect(K, r, z, change)
+
+
+@njit(cache=True, nogil=True)
+def _add_defect(K, r, z, change):  # type: ignore[no-untyped-def]
+    """change += derivative of r - K z, carried by the imaginary parts of K and r."""
+    for i in range(z.shape[0]):
+        total = r[i].imag
+        for j in range(z.shape[0]):
+            total -= K[i, j].imag * z[j]
+        change[i] += total / STEP
+
+
+@njit(cache=True, nogil=True)
 def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z, inverse, directions, out):  # type: ignore[no-untyped-def]
     """out (6 + n + s, 12 + 2 s + 6 + len(directions)) = dz in state, wrench and physics, by complex step."""
     size, states = z.shape[0], x.shape[0]
@@ -80,31 +155,34 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
     change = np.empty(size)
     first = states + WRENCH
     block = CABLES + CABLE_SIZE * modes.shape[0]
-    weighty = physics.shape[0] > block
+    weighty = physics.shape[0] > block and physics[block + LINEAR_DENSITY] != 0.0
+    reach = effects_reach(physics, modes, (states - BODY_STATE) // 2)
     for column in range(states + directions.shape[0]):
         target = column if column < states else column + WRENCH
+        weighs = weighty
         if column < states:
             xc[column] = complex(x[column], STEP)
+            rotation(reference, xc, Rc)
+            assemble(pc, modes, mount, xc, Rc, fc, wc, Kc, rc)
+            change[:] = 0.0
+            _add_defect(Kc, rc, z, change)
         else:
+            if column == states:
+                rotation(reference, xc, Rc)
             d = directions[column - states]
             if d == EXCITER_CLOCK:
                 for i in range(3):
                     fc[i] = complex(force[i], STEP * force_rate[i])
             else:
                 pc[d] = complex(physics[d], STEP)
-        rotation(reference, xc, Rc)
-        assemble(pc, modes, mount, xc, Rc, fc, wc, Kc, rc)
-        for i in range(size):
-            total = rc[i].imag
-            for j in range(size):
-                total -= Kc[i, j].imag * z[j]
-            change[i] = total / STEP
+                weighs = weighty or d == block + LINEAR_DENSITY
+            _defect_in(pc, modes, mount, d, reach, xc, Rc, fc, Kc, rc, z, change)
         for i in range(size):
             total = 0.0
             for j in range(size):
                 total += inverse[i, j] * change[j]
             out[i, target] = total
-        if weighty:
+        if weighs:
             for i in range(modes.shape[0]):
                 out[6 + i, target] += weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
         if column < states:

@@ -33,8 +33,7 @@ class TrueRig:
 
     def late(self, device: str) -> float:
         """By how much the stamps of a device are late, s."""
-        entry = self.parameters.places.clock(device)
-        return 0.0 if entry is None else float(self.device[entry])
+        return float(self.device[self.parameters.places.clock(device)])
 
     @property
     def R_body_exciter(self) -> Array:

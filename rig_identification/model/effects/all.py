@@ -11,8 +11,29 @@ from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.hinge_damping import add_hinge_damping
 from rig_identification.model.effects.hinge_friction import add_hinge_friction
 from rig_identification.model.effects.internal import add_internal
+from rig_identification.model.effects.place import (
+    ADDED_MASS,
+    DAMPING,
+    DRAG_AREA,
+    FRICTION,
+    LINEAR_DENSITY,
+    ROTOR_MASS,
+    active,
+)
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.layout import CABLE_SIZE, CABLES
+
+
+@njit(cache=True)
+def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
+    """Whether any effect answers to the body's numbers, to gravity, to the exciter's mount, to the cables'."""
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    if physics.shape[0] <= block:
+        return False, False, False, False
+    air = active(physics[block + DRAG_AREA]) or active(physics[block + ADDED_MASS])
+    rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
+    hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
+    return air, rotor or rods or internal > 0, rotor, rods or hinges
 
 
 @njit(cache=True)

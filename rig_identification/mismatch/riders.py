@@ -1,0 +1,197 @@
+"""Masses that ride on the body: liquid in a tank, a part on springs, something loose.
+
+Which frequency and direction a rider has is scanned to first order in its mass: a massless
+passenger's travel follows from the fitted motion alone, and the wrench by which a kilogram of it
+would differ from a kilogram fixed to the body is linear in its mass m and in m times its place.
+    q'' + 2 zeta w q' + w^2 q = -d . (f_a + g_rest),   f_a: specific force at the place
+    F = -m d q'',   M = m a x (-d q'') - m (d q) x f
+(effects/internal.py, for small q and slow turning.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter
+
+from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.parameters import AXES, Parameter
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.model import layout
+from rig_identification.model.effects import place
+from rig_identification.model.motion import RigModel
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+#: Frequencies (Hz) at which a rider is looked for, and the damping ratio it is looked for with.
+FREQUENCIES = tuple(float(f) for f in np.geomspace(0.3, 9.0, 36))
+DAMPING = 0.03
+#: Directions of a part on springs, and of a liquid's surface: it swings to all sides.
+DIRECTIONS = {"x": ("x",), "y": ("y",), "z": ("z",), "xy": ("x", "y")}
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One scanned rider."""
+
+    directions: str  # key of DIRECTIONS
+    frequency: float  # Hz
+
+
+SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES)
+#: Columns of a swing: the mass, and the mass times each coordinate of its place.
+WIDTH = 4
+
+
+def middle_of(rig: Rig) -> Array:
+    """(3,) m: where a rider is looked for, about the middle of a body that hangs below its hinges."""
+    size = extent(rig)
+    points = np.array([c.body_point for c in rig.cables])
+    return np.asarray(np.mean(points, axis=0) - [0.0, 0.0, 0.35 * size[2] + 0.15 * float(np.max(size))])
+
+
+def _filters(frequency: float, step: float) -> tuple[Array, Array]:
+    """Discrete filter from specific force along d to the travel q, its input linear between nodes."""
+    omega = 2.0 * np.pi * frequency
+    system = ([-1.0], [1.0, 2.0 * DAMPING * omega, omega**2])
+    numerator, denominator, _ = cont2discrete(system, step, method="foh")
+    return np.atleast_2d(numerator)[0], np.asarray(denominator)
+
+
+def travels(force: Array, gravity: Array, step: float) -> dict[tuple[str, float], tuple[Array, Array]]:
+    """Travel and acceleration (N,) of a massless rider, by axis and frequency.
+
+    force (N, 3): specific force at the rider plus gravity in the rest pose, body axes. gravity (N, 3):
+    gravity less that of the rest pose, body axes: before the first node the rider hangs in it.
+    """
+    out = {}
+    for i, axis in enumerate(AXES):
+        for frequency in FREQUENCIES:
+            omega = 2.0 * np.pi * frequency
+            numerator, denominator = _filters(frequency, step)
+            # Displaced by its weight before the start: the deviation from there starts from zero
+            before = gravity[0, i] / omega**2
+            away = np.asarray(lfilter(numerator, denominator, force[:, i] + gravity[0, i]))
+            q = away + before
+            rate = np.gradient(q, step)
+            out[axis, frequency] = (q, -force[:, i] - 2.0 * DAMPING * omega * rate - omega**2 * q)
+    return out
+
+
+def _pieces_of(evaluation: Evaluation, problem: Problem) -> dict[str, list[int]]:
+    """Runs of a problem by recording, in order of time."""
+    groups: dict[str, list[int]] = {}
+    for i, run in enumerate(problem.runs):
+        groups.setdefault(run.recording.name, []).append(i)
+    _ = evaluation
+    return {name: sorted(which, key=lambda i: problem.runs[i].offset) for name, which in groups.items()}
+
+
+def rider_wrenches(problem: Problem, evaluation: Evaluation) -> dict[int, Array]:
+    """(N, 6, WIDTH len(SWINGS)) wrench per kilogram of every swing, for each run of the problem."""
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    block = layout.effects_offset(model.cables)
+    first = block + place.REFERENCE_ROTATION
+    R_rest = model.physics[first : first + 9].reshape(3, 3)
+    middle = middle_of(rig)
+    out: dict[int, Array] = {}
+    for which in _pieces_of(evaluation, problem).values():
+        raw = np.concatenate(
+            [evaluation.runs[i].motion.outputs[: None if i == which[-1] else -1] for i in which]
+        )
+        step = problem.runs[which[0]].grid.step
+        f = raw[:, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3]
+        w = raw[:, layout.OUT_RATE : layout.OUT_RATE + 3]
+        alpha = raw[:, layout.OUT_ANGULAR_ACCELERATION : layout.OUT_ANGULAR_ACCELERATION + 3]
+        g = raw[:, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3]
+        g_rest = R_rest.T @ model.physics[:3]
+        at = f + np.cross(alpha, middle) + np.cross(w, np.cross(w, middle))
+        single = travels(at + g_rest, g - g_rest, step)
+        wrench = np.zeros((raw.shape[0], 6, WIDTH * len(SWINGS)))
+        for k, swing in enumerate(SWINGS):
+            for axis in DIRECTIONS[swing.directions]:
+                d = np.eye(3)[AXES.index(axis)]
+                q, acceleration = single[axis, swing.frequency]
+                push = -acceleration[:, None] * d
+                wrench[:, :3, WIDTH * k] += push
+                wrench[:, 3:, WIDTH * k] -= np.cross(q[:, None] * d, f)
+                for j in range(3):
+                    wrench[:, 3:, WIDTH * k + 1 + j] += np.cross(np.eye(3)[j], push)
+        start = 0
+        for i in which:
+            nodes = problem.runs[i].grid.nodes
+            out[i] = wrench[start : start + nodes]
+            start += nodes - 1
+    return out
+
+
+def rider_candidate(
+    problem: Problem, swing: Swing, mass: float, found: float, at: Array
+) -> tuple[Candidate, dict[str, float]]:
+    """The hypothesis of a rider, and where its fit starts.
+
+    mass: kg, of the body. found: kg, at (3,) m: what screening made of the rider.
+    """
+    size = float(np.max(extent(problem.bench.rig)))
+    liquid = swing.directions == "xy"
+    effect = "liquid_slosh" if liquid else "sprung_mass"
+    axes = DIRECTIONS[swing.directions]
+    middle = middle_of(problem.bench.rig)
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        blocks = np.zeros((len(axes), layout.INTERNAL_SIZE))
+        for row, axis in enumerate(axes):
+            blocks[row, layout.AXIS + AXES.index(axis)] = 1.0
+        blocks[0, layout.POINT : layout.POINT + 3] = middle
+        blocks[0, layout.FREQUENCY], blocks[0, layout.DAMPING_RATIO] = swing.frequency, DAMPING
+        o = place.internal_block(model.cables, model.internal)
+
+        def number(name: str, unit: str, nominal: float, std: float, entry: int, ratio: bool) -> Parameter:
+            return Parameter(
+                f"{effect}.{name}", unit, nominal, std, "physics", o + entry, bounded=False, ratio=ratio
+            )
+
+        parameters = (
+            number("mass", "kg", 0.0, 0.05 * mass, layout.MASS, False),
+            *(
+                number(f"position.{a}", "m", float(middle[i]), 0.5 * size, layout.POINT + i, False)
+                for i, a in enumerate(AXES)
+            ),
+            number("frequency", "Hz", swing.frequency, 0.3, layout.FREQUENCY, True),
+            number("damping_ratio", "1", DAMPING, 1.0, layout.DAMPING_RATIO, True),
+        )
+        return model.with_internal(blocks), parameters
+
+    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+        out: Told = {}
+        for name, unit in (("mass", "kg"), ("frequency", "Hz"), ("damping_ratio", "1")):
+            key = f"{effect}.{name}"
+            out[name] = (values[key], stds[key], unit)
+        for a in AXES:
+            key = f"{effect}.position.{a}"
+            out[f"position_{a}"] = (values[key], stds[key], "m")
+        return out
+
+    thing = "A liquid swings in a tank:" if liquid else f"A part moves on springs along {swing.directions}:"
+    candidate = Candidate(
+        effect,
+        build(problem.bench.parameters.model)[1],
+        f"{thing} {{value}} take part.",
+        "Fill the tank to the brim or empty it." if liquid else "Block the springs or take the part off.",
+        {"channel": None, "axis": None if liquid else swing.directions},
+        positive=True,
+        tell=told,
+        build=build,
+        experiment=(
+            "measure again with the tank full or empty"
+            if liquid
+            else "measure again with the part blocked; a liquid would swing to both sides"
+        ),
+    )
+    values = {f"{effect}.mass": found}
+    values |= {f"{effect}.position.{a}": float(at[i]) for i, a in enumerate(AXES)}
+    return candidate, values

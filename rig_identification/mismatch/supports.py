@@ -1,0 +1,171 @@
+"""What holds the rig up gives way: cables that stretch, a ceiling that yields.
+
+Both are looked for by a ceiling without compliance that is there in the linearised model only:
+the derivative in its compliance at zero is exact, and n cables of stiffness EA/L side by side yield
+under the weight like a ceiling of compliance L/(n EA).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.parameters import AXES, Parameter
+from rig_identification.estimate.prediction import model_at
+from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.model import layout
+from rig_identification.model.effects import place
+from rig_identification.model.motion import RigModel, State, on_cables
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+#: Frequency (Hz) and damping ratio of the ceiling, and of the cables' stretching, where a fit starts.
+CEILING_FREQUENCY = 10.0
+DAMPING = 0.03
+#: Damping ratio of a probe: it starts unloaded, and what that costs is over after a twentieth of a second.
+PROBE_DAMPING = 1.0
+
+
+def _compliance_prior(rig: Rig, mass: float) -> float:
+    """m/N: five millimetres under the body's weight."""
+    return 0.005 / (mass * rig.gravity)
+
+
+def _block(axis: int, damping: float) -> Array:
+    block = np.zeros((1, layout.INTERNAL_SIZE))
+    block[0, layout.KIND] = layout.CEILING
+    block[0, layout.AXIS + axis] = 1.0
+    block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = CEILING_FREQUENCY, damping
+    return block
+
+
+def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, probe: bool = False) -> Candidate:
+    """A ceiling that yields along one axis of the world; as a probe its compliance alone is free."""
+    a = AXES[axis]
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        o = place.internal_block(model.cables, model.internal)
+        compliance = Parameter(
+            f"ceiling.compliance.{a}",
+            "m/N",
+            0.0,
+            _compliance_prior(rig, mass),
+            "physics",
+            o + layout.COMPLIANCE,
+            bounded=False,
+        )
+        names = (("frequency", "Hz", CEILING_FREQUENCY), ("damping_ratio", "1", DAMPING))
+        more = [
+            Parameter(
+                f"ceiling.{name}.{a}", unit, start, 1.0, "physics", o + entry, bounded=False, ratio=True
+            )
+            for (name, unit, start), entry in zip(
+                names, (layout.FREQUENCY, layout.DAMPING_RATIO), strict=True
+            )
+        ]
+        return model.with_internal(_block(axis, PROBE_DAMPING if probe else DAMPING)), (compliance,) if probe else (compliance, *more)
+
+    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+        compliance = values[f"ceiling.compliance.{a}"]
+        stiffness = 1.0 / compliance
+        spread = stds[f"ceiling.compliance.{a}"] * stiffness**2
+        omega = 2.0 * np.pi * values[f"ceiling.frequency.{a}"]
+        mass = stiffness / omega**2
+        relative = np.hypot(
+            spread / stiffness, 2.0 * stds[f"ceiling.frequency.{a}"] / values[f"ceiling.frequency.{a}"]
+        )
+        return {
+            "stiffness": (stiffness, spread, "N/m"),
+            "mass": (mass, float(mass * relative), "kg"),
+            "damping_ratio": (values[f"ceiling.damping_ratio.{a}"], stds[f"ceiling.damping_ratio.{a}"], "1"),
+        }
+
+    return Candidate(
+        "ceiling_compliance",
+        build(model)[1],
+        f"The ceiling yields along {a}: its stiffness is {{value}}.",
+        "Hang the rig from a stiffer beam, or keep the ceiling in the model.",
+        {"channel": "ceiling", "axis": a},
+        positive=True,
+        tell=told,
+        build=build,
+        experiment="hang a known weight from the ceiling beside the rig and watch the hinges sink",
+    )
+
+
+def cable_elasticity(rig: Rig, model: RigModel, mass: float, stiffness: float) -> Candidate:
+    """Cables that stretch, all alike. stiffness: EA in N at which the fit starts."""
+    n = model.cables
+    length = float(np.mean([c.length for c in rig.cables]))
+    bounce = np.sqrt(n * stiffness / length / mass)
+    entries = [layout.cable_offset(i) for i in range(n)]
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        def shared(name: str, unit: str, nominal: float, std: float, entry: int) -> Parameter:
+            first, *others = (o + entry for o in entries)
+            return Parameter(
+                name, unit, nominal, std, "physics", first, False, tuple(others), ratio=True
+            )
+
+        elastic = replace(
+            model,
+            modes=np.full(n, layout.ELASTIC, dtype=np.int64),
+            can_slacken=np.zeros(n, dtype=np.bool_),
+        )
+        return elastic, (
+            shared("cable.axial_stiffness", "N", stiffness, 1.0, layout.AXIAL_STIFFNESS),
+            shared("cable.axial_damping", "s", 2.0 * DAMPING / bounce, 1.0, layout.AXIAL_DAMPING),
+        )
+
+    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+        EA, tau = values["cable.axial_stiffness"], values["cable.axial_damping"]
+        omega = np.sqrt(n * EA / length / mass)
+        ratio = 0.5 * tau * omega
+        relative = stds["cable.axial_damping"] / tau
+        return {
+            "axial_stiffness": (EA, stds["cable.axial_stiffness"], "N"),
+            "damping_ratio": (float(ratio), float(ratio * relative), "1"),
+        }
+
+    return Candidate(
+        "cable_elasticity",
+        build(model)[1],
+        "The cables stretch: their axial stiffness EA is {value}.",
+        "Keep the stretch in the model; no steel rope is stiff enough to leave it out.",
+        {"channel": None, "axis": None},
+        tell=told,
+        build=build,
+        settle=stretched,
+        experiment="measure the rig's height with and without a known weight, at the hinges and at the ceiling",
+    )
+
+
+def stretched(problem: Problem, point: Point, evaluation: Evaluation) -> Point:
+    """The start states lowered by what the tensions of the inextensible fit stretch the cables."""
+    model = model_at(problem.bench.parameters, point.theta)
+    n = model.cables
+
+    def lowered(state: State, tension: Array) -> State:
+        physics = model.physics.copy()
+        for i in range(n):
+            o = layout.cable_offset(i)
+            strain = max(tension[i], 0.0) / physics[o + layout.AXIAL_STIFFNESS]
+            physics[o + layout.LENGTH] *= 1.0 + strain
+        rigid = replace(
+            model.with_physics(physics), modes=np.full(n, layout.RIGID, dtype=np.int64)
+        )
+        return on_cables(rigid, state)
+
+    starts = tuple(
+        lowered(start, run.motion.outputs[0, layout.OUT_TENSION :])
+        for start, run in zip(point.starts, evaluation.runs, strict=True)
+    )
+    guesses = tuple(
+        lowered(guess, rest.rest.tension)
+        for guess, rest in zip(point.rest_guesses, evaluation.rests, strict=True)
+    )
+    return replace(point, starts=starts, rest_guesses=guesses)
