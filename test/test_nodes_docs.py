@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import re
 from pathlib import Path
@@ -62,3 +63,26 @@ def test_launch_files_name_executables_of_the_package() -> None:
         )
     assert {"tracker", "identifier", "rig_simulator"} <= named
     assert all(callable(getattr(process, name, None)) for name in named)
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "launch").glob("*.launch.py")), ids=lambda file: file.stem)
+def test_launch_files_parse_and_use_what_they_declare(file: Path) -> None:
+    """Without launch itself: arguments that are used are declared, and named configurations are there."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    calls = [
+        node for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    ]
+
+    def first(name: str) -> set[str]:
+        return {
+            str(c.args[0].value) for c in calls if c.func.id == name and isinstance(c.args[0], ast.Constant)
+        }
+
+    assert "generate_launch_description" in {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}
+    declared = first("DeclareLaunchArgument")
+    assert first("LaunchConfiguration") <= declared
+    assert "namespace" in declared
+    named = {
+        str(n.value) for n in ast.walk(tree) if isinstance(n, ast.Constant) and str(n.value).endswith(".yaml")
+    }
+    assert all((ROOT / "config" / name).is_file() for name in named), named

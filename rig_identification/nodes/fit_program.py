@@ -31,8 +31,8 @@ def fit(path: str) -> dict[str, object]:
 
     Raises InputError.
     """
-    from rig_identification.estimate import identify
     from rig_identification.live.excitation import motion_in_noise, moves
+    from rig_identification.mismatch import identify
     from rig_identification.report.result_json import result_to_dict
     from rig_identification.session import read_session
 
