@@ -4,9 +4,16 @@ import json
 from xml.etree import ElementTree
 
 import pytest
+from jinja2 import Environment
 
 from rig_identification.cli.main import main
 from rig_identification.thesis import load_case
+from rig_identification.thesis_report import rerun_document
+from rig_identification.thesis_report.integration_figures import integration_figures
+from rig_identification.thesis_report.sections import BEFORE, add_sections
+from rig_identification.thesis_rerun import Rerun, fly_case
+from rig_identification.thesis_rerun.integration import check_integration
+from rig_identification.thesis_rerun.statics import rerun_statics
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +56,23 @@ def test_page_holds_the_table_and_loads_nothing(written):
     page = (written / "report.html").read_text()
     assert "(a) thesis' predictor" in page or "(a) thesis&#39; predictor" in page
     assert "171.89" in page or ">172<" in page
+    assert page.index('id="wrench"') < page.index('id="table"')
+    assert 'id="statics"' not in page  # chapter 2 comes with all cases alone
     assert "src=" not in page
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+
+
+def test_chapters_2_and_3_stand_in_page_and_document():
+    found = Rerun((), None, rerun_statics())
+    page = add_sections(f"<body>{BEFORE}</h2></body>", Environment(autoescape=True), found)
+    assert all(number in page for number in ("609.860", "612.000", "-2.140"))
+    table = rerun_document(found, 1.0)["table_2_1"]
+    assert abs(table["found_error"]).max() < 1e-5
+    assert table["published_error"][2] == pytest.approx(-2.14e-3)
+    drawn = dict(integration_figures(check_integration(fly_case(load_case(1)), 0)))
+    paths = ".//path[@class='predicted']"
+    curves = {name: len(ElementTree.fromstring(svg).findall(paths)) for name, svg in drawn.items()}
+    assert curves == {"error of the integrated centre": 3, "error of the integrated T": 9}
 
 
 @pytest.mark.parametrize(
