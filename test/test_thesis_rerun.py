@@ -126,7 +126,7 @@ def test_map_of_case_5(case_1):
 
 @pytest.mark.parametrize("number", [7, 8])
 def test_uncertainty_is_that_of_simulated_errors(number):
-    """Errors to first order of independent sessions have unit size in their own sigma, jumps of force or not."""
+    """Errors to first order of independent sessions have unit size in their own sigma, jumps or not."""
     found = [realistic_uncertainty(load_case(number), seed) for seed in range(4)]
     six = np.concatenate([r.error_in_sigma[np.triu_indices(3)] for r in found])
     assert 0.5 < np.sqrt(np.mean(six**2)) < 1.6
