@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.rest_evidence import RestEvidence
-from rig_identification.estimate.segments import solve_in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
-from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
@@ -68,16 +66,11 @@ def _reweighted_rest(evidence: RestEvidence, predicted: tuple[Array, ...]) -> Re
 
 
 def solve_cautiously(
-    problem: Problem,
-    theta: Array,
-    rest: State,
-    rest_guesses: tuple[State, ...],
-    notify: Callable[[int, float], None] | None = None,
-) -> tuple[Problem, Evaluation, bool]:
-    """Fit in pieces, weighed by the residuals themselves: (problem, evaluation, whether it converged)."""
-    parts, evaluation, converged = solve_in_pieces(problem, theta, rest, rest_guesses, notify)
+    parts: Problem, evaluation: Evaluation, notify: Callable[[int, float], None] | None = None
+) -> tuple[Problem, Evaluation]:
+    """A fit in pieces (segments.solve_in_pieces) weighed by the residuals themselves."""
     for _ in range(ROUNDS):
         parts = reweighted(parts, evaluation)
         point = Point(evaluation.point.theta, evaluation.point.starts, evaluation.point.rest_guesses)
-        evaluation, converged = solve(parts, point, iterations=10, notify=notify)
-    return parts, evaluation, converged
+        evaluation, _ = solve(parts, point, iterations=10, notify=notify)
+    return parts, evaluation

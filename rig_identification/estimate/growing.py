@@ -28,6 +28,18 @@ GROWTH = 4.0
 HOLD = 0.1
 
 
+#: Mean square residual of a short horizon above which the model lacks something, and the steps that the
+#: whole run is then worth.
+HOPELESS_SQUARE = 2.0
+ROUGH = 4
+
+
+def misfit(evaluation: Evaluation) -> float:
+    """Mean square of the whitened residuals; 1 where there are none."""
+    residuals = np.concatenate([np.zeros(0), *(run.residual for run in evaluation.runs)])
+    return float(np.mean(residuals**2)) if residuals.size else 1.0
+
+
 def horizons(duration: float) -> list[float]:
     """Ends (s) of the growing horizons, the last one the whole run."""
     ends, end = [], FIRST_HORIZON
@@ -54,6 +66,7 @@ def solve_growing(
     duration = max((run.grid.duration for run in problem.runs), default=0.0)
     ends = horizons(duration) if problem.runs else [0.0]
     guess = point.theta[:INERTIAL].copy()
+    worth = 20
     for i, end in enumerate(ends):
         whole = i == len(ends) - 1
         part = problem
@@ -71,11 +84,14 @@ def solve_growing(
         evaluation, converged = solve(
             part,
             point,
-            iterations=20 if whole else 12,
+            iterations=worth if whole else 12,
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else _at(notify, end, duration),
         )
         point = evaluation.point
+        if misfit(evaluation) > HOPELESS_SQUARE:
+            # What a few seconds cannot fit, the whole run cannot: a rough fit tells as much
+            worth = ROUGH
     return evaluation, converged
 
 

@@ -20,8 +20,8 @@ from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench, Linearised
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.scan import scan
-from rig_identification.estimate.segments import free_part, solve_in_pieces
-from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.estimate.segments import free_part, in_pieces, solve_in_pieces
+from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import State, rig_model
@@ -210,12 +210,20 @@ def scores(fitted: Fitted) -> Scores:
 
 @dataclass(frozen=True)
 class Ideal:
-    """The ideal model's fit, its verdict, and the cautious fit where it fails."""
+    """The ideal model's fit, its verdict, and short pieces to look closer at where it fails."""
 
     fitted: Fitted
     scores: Scores
     mismatch: Mismatch
-    careful: tuple[Problem, Evaluation] | None
+    pieces: tuple[Problem, Point] | None
+
+    def careful(self, notify: Progress) -> tuple[Problem, Evaluation] | None:
+        """The cautious fit (cautious.py), where the ideal model fails."""
+        if self.pieces is None:
+            return None
+        notify("weighing each channel by its residual", 0.9)
+        parts, point = self.pieces
+        return solve_cautiously(parts, solve(parts, point, iterations=15)[0])
 
 
 #: What the report says of numbers that come from the cautious fit.
@@ -227,18 +235,17 @@ CAUTION = (
 
 
 def fit_ideal(session: Session, notify: Progress) -> Ideal:
-    """Fit the ideal model, judge it, and fit cautiously where it fails."""
+    """Fit the ideal model, judge it, and cut the runs into short pieces where it fails."""
     fitted = fit_session(session, notify)
     found = scores(fitted)
     parameters = parameter_estimates(fitted.problem, fitted.evaluation)
     mismatch = judge(fitted, parameters, found.holdout, found.training, ORDINARY)
-    careful = None
+    pieces = None
     if mismatch.verdict == "unexplained" and fitted.problem.runs:
-        notify("fitting in short pieces, each channel weighed by its residual", 0.7)
+        notify("fitting in short pieces", 0.7)
         point = fitted.evaluation.point
-        parts, evaluation, _ = solve_cautiously(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
-        careful = (parts, evaluation)
-    return Ideal(fitted, found, mismatch, careful)
+        pieces = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
+    return Ideal(fitted, found, mismatch, pieces)
 
 
 def compose(
@@ -272,7 +279,7 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     notify = progress or _silent
     ideal = fit_ideal(session, notify)
     notify("done", 1.0)
-    return compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
+    return compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful(notify))
 
 
 def error_in_sigma(fits) -> float:  # type: ignore[no-untyped-def]

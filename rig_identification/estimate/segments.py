@@ -34,6 +34,15 @@ def pieces(run: Run, length: float = PIECE) -> tuple[Run, ...]:
     return tuple(run.between(int(a), int(b)) for a, b in pairwise(edges))
 
 
+def in_pieces(
+    problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...]
+) -> tuple[Problem, Point]:
+    """The same problem with every run in pieces, and a point with a start state for each."""
+    cut = tuple(piece for run in problem.runs for piece in pieces(run))
+    starts = tuple(launch_state(problem.bench, piece, theta, rest) for piece in cut)
+    return replace(problem, runs=cut), Point(theta, starts, rest_guesses)
+
+
 def solve_in_pieces(
     problem: Problem,
     theta: Array,
@@ -42,10 +51,8 @@ def solve_in_pieces(
     notify: Callable[[int, float], None] | None = None,
 ) -> tuple[Problem, Evaluation, bool]:
     """The same problem with every run in pieces: (that problem, its evaluation, whether it converged)."""
-    cut = tuple(piece for run in problem.runs for piece in pieces(run))
-    starts = tuple(launch_state(problem.bench, piece, theta, rest) for piece in cut)
-    parts = replace(problem, runs=cut)
-    evaluation, converged = solve(parts, Point(theta, starts, rest_guesses), iterations=15, notify=notify)
+    parts, point = in_pieces(problem, theta, rest, rest_guesses)
+    evaluation, converged = solve(parts, point, iterations=15, notify=notify)
     return parts, evaluation, converged
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.prediction import (
     START_UNIT,
     Bench,
@@ -206,7 +206,7 @@ def _step_within_bounds(
     """
     p = problem.bench.parameters.size
     theta = current.point.theta
-    limit = np.array([problem.bound if q.bounded else np.inf for q in problem.bench.parameters.free])
+    limit = np.array([_limit(problem, q) for q in problem.bench.parameters.free])
     change, fixed = change.copy(), fixed.copy()
     for _ in range(20):
         open_ = np.flatnonzero(~fixed)
@@ -219,13 +219,33 @@ def _step_within_bounds(
         if not np.any(reached):
             break
         beyond = np.flatnonzero(reached)
-        change[beyond] = np.sign(theta[beyond] + change[beyond]) * problem.bound - theta[beyond]
+        change[beyond] = np.sign(theta[beyond] + change[beyond]) * limit[beyond - INERTIAL] - theta[beyond]
         fixed |= reached
     return change
 
 
+#: No positive number leaves so many std of its logarithm's prior.
+WIDEST = 3.0
+
+
+def _limit(problem: Problem, parameter: Parameter) -> float:
+    """Std of its prior that a free parameter stays within."""
+    if parameter.ratio:
+        return WIDEST
+    return problem.bound if parameter.bounded else np.inf
+
+
 #: Mean square of the whitened residuals above which a fit explains nothing.
 HOPELESS = 100.0
+#: Share of what noise does not account for below which a step's gain is not worth taking: a model
+#: that lacks something has no optimum worth polishing.
+POLISH = 3e-3
+
+
+def excess(evaluation: Evaluation) -> float:
+    """Cost (nats) beyond what noise alone would leave."""
+    residuals = np.concatenate([np.zeros(0), *(run.residual for run in evaluation.runs)])
+    return max(0.0, 0.5 * float(residuals @ residuals - residuals.size))
 
 
 def on_plateau(evaluation: Evaluation) -> bool:
@@ -251,7 +271,8 @@ def solve(
     """Minimise from ``point``: (last evaluation, whether it converged).
 
     Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
-    estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum.
+    estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
+    a step won less than POLISH of what stays unexplained, the fit ends there as well: the residuals judge it.
     A plateau, where nothing fits and nothing answers any more, does not count.
     """
     current = evaluate(problem, point)
@@ -267,7 +288,9 @@ def solve(
             trial = evaluate(problem, _moved(problem, current, change))
             if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
                 damping = max(damping * 0.1, 1e-9)
-                current = trial
+                won, current = current.cost - trial.cost, trial
+                if max(won, tolerance) < POLISH * excess(current) and damping <= 1e-3:
+                    return current, not on_plateau(current)
                 break
             damping = max(damping, 1e-6) * 10.0
             if damping > 1e6:

@@ -7,19 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.growing import fit_start_growing
-from rig_identification.estimate.identify import ORDINARY, Fitted, parameter_estimates, scores
+from rig_identification.estimate.growing import fit_start_growing, misfit
+from rig_identification.estimate.identify import ORDINARY, Fitted, Ideal, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.prediction import model_at
-from rig_identification.estimate.segments import solve_in_pieces
-from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import Point, Problem, solve
 from rig_identification.estimate.verdict import judge
 from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.search import MOST_EFFECTS, Trial, catalogue, trials
+from rig_identification.mismatch.search import MOST_EFFECTS, Trial, adopted, catalogue, trials
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
+
+#: Steps of the ideal model's fit to short pieces, about which hypotheses are screened.
+PIECES_STEPS = 8
+#: Mean square of whitened residuals up to which short pieces count as explained.
+EXPLAINED = 1.3
 
 
 @dataclass(frozen=True)
@@ -30,19 +34,18 @@ class Explained:
     mismatch: Mismatch
 
 
-def explain(ideal: Fitted, verdict: Mismatch, careful: Evaluation | None, notify: Notify) -> Explained | None:
+def explain(found_ideal: Ideal, notify: Notify) -> Explained | None:
     """Search for what the ideal model leaves out; None where nothing is found.
 
-    verdict: of the ideal model. careful: the cautious fit, where there is one: the search then
-    starts from its body, in short pieces.
+    Where the ideal model fails the search looks at short pieces.
     """
+    ideal = found_ideal.fitted
     problem = with_reference(ideal.problem, ideal.rest)
     candidates = catalogue(problem)
     here, evaluation = problem, ideal.evaluation
-    if verdict.verdict == "unexplained" and careful is not None:
-        notify("search: short pieces", 0.0)
-        guesses = careful.point.rest_guesses
-        here, evaluation, _ = solve_in_pieces(problem, careful.point.theta, ideal.rest, guesses)
+    if found_ideal.pieces is not None:
+        here = with_reference(found_ideal.pieces[0], ideal.rest)
+        evaluation, _ = solve(here, found_ideal.pieces[1], iterations=PIECES_STEPS, tolerance=0.5)
     found: list[Trial] = []
     rivals: list[dict[str, object]] = []
     best: Explained | None = None
@@ -66,7 +69,10 @@ def explain(ideal: Fitted, verdict: Mismatch, careful: Evaluation | None, notify
             }
             for t in done[1:]
         ]
-        here, evaluation = done[0].problem, done[0].evaluation
+        here, evaluation = adopted(here, evaluation, done[0])
+        if misfit(evaluation) > EXPLAINED and step < MOST_EFFECTS - 1:
+            # Something large is left: there is no use yet in whole runs
+            continue
         notify(
             "search: whole runs with " + ", ".join(t.candidate.label for t in found),
             (step + 0.9) / (MOST_EFFECTS + 1),
@@ -74,6 +80,8 @@ def explain(ideal: Fitted, verdict: Mismatch, careful: Evaluation | None, notify
         best = _whole(ideal, problem, found, rivals)
         if best.mismatch.verdict == "explained":
             break
+    if best is None and found:
+        best = _whole(ideal, problem, found, rivals)
     return best
 
 

@@ -31,28 +31,24 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
             progress(stage, fraction)
 
     ideal = fit_ideal(session, lambda stage, fraction: notify(stage, IDEAL_SHARE * fraction))
-    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
-    if not ideal.fitted.problem.runs:
-        return plain
-    careful = None if ideal.careful is None else ideal.careful[1]
-    try:
-        found = explain(
-            ideal.fitted,
-            ideal.mismatch,
-            careful,
-            lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
-        )
-    except (FloatingPointError, np.linalg.LinAlgError) as error:
-        note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
-        return replace(plain, notes=(*plain.notes, note))
+    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+    found, note = None, None
+    if ideal.fitted.problem.runs:
+        try:
+            found = explain(
+                ideal,
+                lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
+            )
+        except (FloatingPointError, np.linalg.LinAlgError) as error:
+            note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
+    if found is not None and found.mismatch.verdict == "explained":
+        answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, None)
+        return replace(answer, figures={**answer.figures, "ideal": plain})
+    careful = ideal.careful(notify)
+    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, careful)
+    if note is not None:
+        plain = replace(plain, notes=(*plain.notes, note))
     if found is None:
         return plain
-    unexplained = found.mismatch.verdict == "unexplained"
-    answer = compose(
-        session,
-        found.fitted,
-        scores(found.fitted),
-        found.mismatch,
-        ideal.careful if unexplained else None,
-    )
+    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful)
     return replace(answer, figures={**answer.figures, "ideal": plain})

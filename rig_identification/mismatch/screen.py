@@ -22,7 +22,7 @@ from rig_identification.estimate.solve import Evaluation, Point, Problem, evalua
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import SWINGS, WIDTH, middle_of, rider_candidate, rider_wrenches
-from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate
+from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, largest_compliance
 from rig_identification.model.effects import place
 from rig_identification.model.layout import RIGID, effects_offset
 from rig_identification.model.motion import State
@@ -151,6 +151,7 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
     name, compliance = next(iter(probe.values.items()))
     if compliance <= 0.0:
         return []
+    compliance = min(compliance, largest_compliance(rig, mass))
     axis = "xyz".index(name[-1])
     out = [Promise(ceiling_candidate(rig, model, mass, axis), probe.gain, probe.values)]
     if axis == 2:
@@ -186,20 +187,24 @@ def _riders(
     solved = cho_solve(factor, seen)
     left = gradient - solved.T @ (scale * full.gradient[base])
     center = middle_of(problem.bench.rig)
-    far = float(np.max(extent(problem.bench.rig)))
-    prior = np.diag([1.0 / (0.05 * mass) ** 2] + [1.0 / (0.05 * mass * far) ** 2] * 3)
+    far = 0.5 * float(np.max(extent(problem.bench.rig)))
+    # Columns of a mass at the middle, and of its distance from there
+    about = np.eye(WIDTH)
+    about[1:, 0] = center
     best: dict[str, Promise] = {}
     for k, swing in enumerate(SWINGS):
         mine = slice(WIDTH * k, WIDTH * (k + 1))
-        matrix = own[k] - seen[:, mine].T @ solved[:, mine] + prior
-        step = np.linalg.lstsq(matrix, left[mine], rcond=1e-12)[0]
-        gain = 0.5 * float(step @ left[mine])
+        matrix = about.T @ (own[k] - seen[:, mine].T @ solved[:, mine]) @ about
+        right = about.T @ left[mine]
+        alone = right[0] / (matrix[0, 0] + 1.0 / (0.05 * mass) ** 2)
+        if alone <= 0.0:
+            continue
+        prior = np.diag([1.0 / (0.05 * mass) ** 2] + [1.0 / (alone * far) ** 2] * 3)
+        step = np.linalg.lstsq(matrix + prior, right, rcond=1e-12)[0]
+        gain = 0.5 * float(step @ right)
         if step[0] <= 0.0 or (swing.directions in best and gain <= best[swing.directions].gain):
             continue
-        at = center + np.clip(step[1:] / step[0] - center, -far, far)
-        # Along its own direction a rider's place tells little
-        for axis in swing.directions if len(swing.directions) == 1 else "":
-            at["xyz".index(axis)] = center["xyz".index(axis)]
+        at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
         candidate, values = rider_candidate(problem, swing, mass, float(step[0]), at)
         best[swing.directions] = Promise(candidate, gain, values)
     return list(best.values())

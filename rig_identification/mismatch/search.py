@@ -15,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Problem, solve
+from rig_identification.estimate.growing import misfit, settled_starts
+from rig_identification.estimate.parameters import AXES, INERTIAL
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
+from rig_identification.mismatch.riders import SWINGS, Swing, rider_candidate
 from rig_identification.mismatch.rig_errors import rig_errors
-from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.sensor_errors import sensor_errors
+from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, largest_compliance
+from rig_identification.model.layout import RIGID
 
 Array = NDArray[np.float64]
 Notify = Callable[[str], None]
@@ -34,10 +37,23 @@ FITTED = 4
 MOST_EFFECTS = 3
 #: A promise this much (nats) behind the best is not worth a fit, in parts of the best.
 WORTH = 0.05
-#: Mean square of whitened residuals below which nothing much is left, and the share of the best promise
-#: that makes a rival of it even so.
+#: Pieces that hypotheses are tried on.
+TRIED = 4
+TRIED_FAR = 2
+VERY_FAR = 5.0
+#: Mean square of whitened residuals below which nothing much is left, and how many times as much as the best
+#: a hypothesis may have left after its first steps to be its rival even so.
 AT_NOISE = 1.05
-RIVAL = 0.9
+RIVAL = 10.0
+#: Steps of a first, short fit (more where the model itself changes) and of one to the end, and how many hypotheses get that far.
+FIRST_STEPS = 4
+CHANGED_STEPS = 9
+LAST_STEPS = 20
+FINISHED = 3
+#: Mean square of whitened residuals above which linear screening is not the last word, and the
+#: frequency (Hz) at which a body bounces on its cables where a fit of their stretch starts.
+FAR = 1.3
+BOUNCE = 12.0
 
 
 @dataclass(frozen=True)
@@ -48,6 +64,7 @@ class Trial:
     problem: Problem
     evaluation: Evaluation
     evidence: float  # log marginal likelihood less a constant
+    settled: bool = False  # fitted to its end
 
 
 def catalogue(problem: Problem) -> list[Candidate]:
@@ -83,8 +100,46 @@ def log_evidence(evaluation: Evaluation) -> float:
     return -evaluation.cost - 0.5 * float(log_det) if sign > 0 else -np.inf
 
 
+def worst_pieces(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
+    """The problem on the pieces that fit worst: what tells hypotheses apart at a fraction of the cost."""
+    tried = TRIED_FAR if misfit(evaluation) > VERY_FAR else TRIED
+    if len(problem.runs) <= tried:
+        return problem, evaluation
+    misfits = [float(np.sum(run.residual**2) - run.residual.size) for run in evaluation.runs]
+    chosen = sorted(np.argsort(misfits)[-tried:])
+    part = replace(problem, runs=tuple(problem.runs[i] for i in chosen))
+    point = replace(
+        evaluation.point,
+        starts=tuple(evaluation.point.starts[i] for i in chosen),
+        latents=tuple(evaluation.point.latents[i] for i in chosen) if evaluation.point.latents else (),
+    )
+    again = evaluate(part, point)
+    return (problem, evaluation) if again is None else (part, again)
+
+
+def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Problem, Evaluation]:
+    """A trial's effect in the model of all pieces, fitted."""
+    wide = extended(problem, (trial.candidate,))
+    if len(wide.runs) == len(trial.problem.runs):
+        return trial.problem, trial.evaluation
+    theta = trial.evaluation.point.theta
+    point = carried(wide, problem, evaluation.point)
+    if trial.candidate.settle is not None:
+        point = trial.candidate.settle(wide, replace(point, theta=theta), evaluation)
+    known = {
+        (run.recording.name, run.offset): start
+        for run, start in zip(trial.problem.runs, trial.evaluation.point.starts, strict=True)
+    }
+    starts = tuple(
+        known.get((run.recording.name, run.offset), start)
+        for run, start in zip(wide.runs, point.starts, strict=True)
+    )
+    fitted, _ = solve(wide, replace(point, theta=theta, starts=starts), iterations=6, tolerance=0.5)
+    return wide, fitted
+
+
 def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial | None:
-    """Fit one hypothesis from what screening promised; None where its sign makes no sense."""
+    """A first, short fit of one hypothesis from what screening promised; None where it cannot start."""
     candidate = promise.candidate
     wide = extended(problem, (candidate,))
     point = carried(wide, problem, evaluation.point)
@@ -98,15 +153,28 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
             theta[i] = max(theta[i], 0.0)
     if candidate.settle is not None:
         point = candidate.settle(wide, replace(point, theta=theta), evaluation)
+    point = replace(point, theta=theta)
     try:
-        fitted, _ = solve(wide, replace(point, theta=theta), iterations=10, tolerance=0.05)
+        if candidate.build is not None:
+            # A changed model throws the start states out first, and everything else would bend to that
+            point = replace(point, starts=settled_starts(wide, point))
+        steps = FIRST_STEPS if candidate.build is None else CHANGED_STEPS
+        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5)
     except FloatingPointError:
         return None
-    if candidate.positive:
-        i = wide.bench.parameters.index_of(candidate.parameters[0].name)
-        if fitted.point.theta[i] <= 0.0:
+    return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < FAR)
+
+
+def finished(trial: Trial) -> Trial | None:
+    """The trial fitted to its end; None where its sign makes no sense there."""
+    if not trial.settled:
+        fitted, _ = solve(trial.problem, trial.evaluation.point, iterations=LAST_STEPS, tolerance=0.05)
+        trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
+    if trial.candidate.positive:
+        i = trial.problem.bench.parameters.index_of(trial.candidate.parameters[0].name)
+        if trial.evaluation.point.theta[i] <= 0.0:
             return None
-    return Trial(candidate, wide, fitted, log_evidence(fitted))
+    return trial
 
 
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
@@ -123,25 +191,73 @@ def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool
 
 def _at_noise(trial: Trial) -> bool:
     """Whether a hypothesis leaves residuals of the size of the noise."""
-    residuals = np.concatenate([run.residual for run in trial.evaluation.runs])
-    return float(np.mean(residuals**2)) < AT_NOISE
+    return misfit(trial.evaluation) < AT_NOISE
 
 
 def trials(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate], limit: float, notify: Notify
 ) -> list[Trial]:
-    """Full fits of the most promising hypotheses, most likely first."""
-    promises = screen(problem, evaluation, candidates, mass_of(problem, evaluation))
+    """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
+
+    All get a few steps; the best few go on to their end, and where one reaches the noise only those
+    that had come as close. Where much is left, what gives way is tried whatever screening
+    says: it is far from linear.
+    """
+    mass = mass_of(problem, evaluation)
+    promises = screen(problem, evaluation, candidates, mass)
     worthy = [p for p in promises if p.gain > needed_gain(p.candidate, len(candidates) + len(SWINGS))]
+    worthy = [p for p in worthy if p.gain > WORTH * worthy[0].gain][:FITTED]
+    if misfit(evaluation) > FAR:
+        seen = {p.candidate.label for p in worthy}
+        worthy += [p for p in far_promises(problem, promises, mass) if p.candidate.label not in seen]
     if not worthy:
         return []
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
-    done: list[Trial] = []
-    for promise in [p for p in worthy if p.gain > WORTH * worthy[0].gain][:FITTED]:
-        if any(_at_noise(t) for t in done) and promise.gain < RIVAL * worthy[0].gain:
-            break
+    problem, evaluation = worst_pieces(problem, evaluation)
+    begun: list[Trial] = []
+    for promise in worthy:
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise)
-        if trial is not None and beyond_doubt(trial, ordinary, limit):
-            done.append(trial)
+        if trial is not None:
+            begun.append(trial)
+    begun.sort(key=lambda t: -t.evidence)
+    done: list[Trial] = []
+    for trial in begun:
+        if len(done) == FINISHED:
+            break
+        if any(_at_noise(t) for t in done) and excess(trial.evaluation) > RIVAL * excess(begun[0].evaluation):
+            continue
+        notify(trial.candidate.label)
+        ended = finished(trial)
+        if ended is not None and beyond_doubt(ended, ordinary, limit):
+            done.append(ended)
     return sorted(done, key=lambda t: -t.evidence)
+
+
+def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:
+    """What gives way, and the best rider to one side and to all, without regard to what screening promises."""
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    if model.internal or not np.all(model.modes == RIGID):
+        return []
+    length = float(np.mean([c.length for c in rig.cables]))
+    stiffness = mass * (2.0 * np.pi * BOUNCE) ** 2 * length / model.cables
+    out = [Promise(cable_elasticity(rig, model, mass, stiffness), 0.0, {})]
+    sink = 0.1 * largest_compliance(rig, mass)
+    told = {p.candidate.label: p for p in promises}
+    for axis, a in enumerate(AXES):
+        ceiling = ceiling_candidate(rig, model, mass, axis)
+        out.append(told.get(ceiling.label, Promise(ceiling, 0.0, {f"ceiling.compliance.{a}": sink})))
+    riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
+    out += riders[:1]
+    if riders and riders[0].candidate.effect == "sprung_mass":
+        # What swings along one axis may swing to all sides
+        first = riders[0]
+        o = {p.name: p for p in first.candidate.parameters}
+        swing = Swing("xy", o["sprung_mass.frequency"].nominal)
+        at = np.array([o[f"sprung_mass.position.{a}"].nominal for a in AXES])
+        out.append(Promise(*_with_gain(rider_candidate(problem, swing, mass, first.values["sprung_mass.mass"], at))))
+    return out
+
+
+def _with_gain(found: tuple[Candidate, dict[str, float]]) -> tuple[Candidate, float, dict[str, float]]:
+    return found[0], 0.0, found[1]

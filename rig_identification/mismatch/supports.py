@@ -30,6 +30,11 @@ DAMPING = 0.03
 PROBE_DAMPING = 1.0
 
 
+def largest_compliance(rig: Rig, mass: float) -> float:
+    """m/N: a support that sinks by a centimetre under the body shows without any tool."""
+    return 0.01 / (mass * rig.gravity)
+
+
 def _compliance_prior(rig: Rig, mass: float) -> float:
     """m/N: five millimetres under the body's weight."""
     return 0.005 / (mass * rig.gravity)
