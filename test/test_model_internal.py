@@ -23,6 +23,7 @@ from rig_identification.model.equilibrium import design_pose, find_rest, settle
 from rig_identification.model.motion import Input, Motion, RigModel, simulate
 
 Array = NDArray[np.float64]
+AXES = np.eye(3)
 
 
 def rider(mass: float, point: Array, axes: Array, frequency: float, damping: float = 0.0) -> Array:
@@ -32,6 +33,13 @@ def rider(mass: float, point: Array, axes: Array, frequency: float, damping: flo
     blocks[0, layout.MASS] = mass
     blocks[0, layout.POINT : layout.POINT + 3] = point
     blocks[0, layout.FREQUENCY], blocks[0, layout.DAMPING_RATIO] = frequency, damping
+    return blocks
+
+
+def pendulum(mass: float, point: Array, frequency: float, damping: float = 0.0) -> Array:
+    """Blocks of a liquid that hangs."""
+    blocks = rider(mass, point, AXES[:2], frequency, damping)
+    blocks[0, layout.PENDULUM] = 1.0
     return blocks
 
 
@@ -82,20 +90,25 @@ def energy(model: RigModel, motion: Motion) -> Array:
                 mine = [i for i in mine if int(blocks[i, layout.LEADER]) == j]
                 shift = sum(q[i] * blocks[i, layout.AXIS : layout.AXIS + 3] for i in mine)
                 slip = sum(speed[i] * blocks[i, layout.AXIS : layout.AXIS + 3] for i in mine)
+                if b[layout.PENDULUM]:
+                    arm = np.linalg.norm(gravity) / omega**2
+                    s = np.sqrt(arm**2 - q[j] ** 2 - q[j + 1] ** 2)
+                    up = np.array([0.0, 0.0, 1.0])
+                    shift = shift + up * (arm - s)
+                    slip = slip + up * (q[j] * speed[j] + q[j + 1] * speed[j + 1]) / s
                 a, m = b[layout.POINT : layout.POINT + 3], b[layout.MASS]
                 moved, fixed = v + np.cross(w, a + shift) + slip, v + np.cross(w, a)
                 total[k] += 0.5 * m * (moved @ moved - fixed @ fixed) - m * gravity @ R @ shift
-                total[k] += m * shift @ (R_rest.T @ gravity) + 0.5 * m * omega**2 * shift @ shift
+                if not b[layout.PENDULUM]:
+                    total[k] += m * shift @ (R_rest.T @ gravity) + 0.5 * m * omega**2 * shift @ shift
     return total
-
-
-AXES = np.eye(3)
 
 
 def rigs() -> list[tuple[str, RigModel, Sample]]:
     out = []
     for name, sample, blocks in (
         ("slosh", thesis_case_14(), rider(80.0, np.array([0.4, 0.2, -0.8]), AXES[:2], 0.8)),
+        ("pendulum", thesis_case_14(), pendulum(80.0, np.array([0.4, 0.2, -0.8]), 0.6)),
         ("sprung", trifilar(), rider(40.0, np.array([-0.2, 0.1, -0.6]), AXES[2:], 2.1)),
         ("ceiling", thesis_case_14(), ceiling(2e-6, AXES[2], 5.0)),
         ("sideways", trifilar(), ceiling(5e-6, np.array([0.6, 0.8, 0.0]), 4.0)),
@@ -130,9 +143,10 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
     sample = random_sample(5, 3)
     model = with_rest(sample.model(axial_stiffness=2e6 if elastic else None, rods=True))
     model = model.with_internal(rider(60.0, np.array([0.3, 0.1, -0.5]), AXES[:2], 0.9, 0.05))
+    model = model.with_internal(pendulum(30.0, np.array([0.1, 0.2, -0.4]), 1.4, 0.02))
     model = model.with_internal(rider(0.0, np.array([0.1, -0.3, -0.2]), AXES[2:], 2.0, 0.02))
     model = model.with_internal(ceiling(1e-6, AXES[2], 6.0, 0.03))
-    assert model.internal == 4
+    assert model.internal == 6
     start, drive = moving(sample, model, 5), driven(41, 0.01, 5)
     body = [
         layout.INERTIAL,
@@ -143,9 +157,9 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
     check_physics(model, start, drive, body, 1e-5)
     steps = {layout.MASS: 0.1, layout.POINT: 1e-3, layout.POINT + 2: 1e-3}
     steps |= {layout.FREQUENCY: 1e-4, layout.DAMPING_RATIO: 1e-3}
-    entries = {place.internal_block(3, k) + e: h for k in (0, 2) for e, h in steps.items()}
-    entries[place.internal_block(3, 3) + layout.COMPLIANCE] = 1e-10
-    entries[place.internal_block(3, 3) + layout.FREQUENCY] = 1e-3
+    entries = {place.internal_block(3, k) + e: h for k in (0, 2, 4) for e, h in steps.items()}
+    entries[place.internal_block(3, 5) + layout.COMPLIANCE] = 1e-10
+    entries[place.internal_block(3, 5) + layout.FREQUENCY] = 1e-3
     exact = simulate(model, start, drive, directions=np.array(list(entries)), substeps=20)
     assert exact.J is not None
     where = slice(layout.OUT_RATE, None)
@@ -161,7 +175,7 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
 
 
 def test_start_coordinates_of_internal_motion() -> None:
-    _, model, sample = rigs()[2]
+    _, model, sample = rigs()[3]
     start = sample.start.moved(np.zeros(model.states))
     column = np.zeros((model.states, 2))
     column[12, 0] = column[13, 1] = 1.0

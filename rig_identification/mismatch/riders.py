@@ -148,6 +148,7 @@ def rider_candidate(
             blocks[row, layout.AXIS + AXES.index(axis)] = 1.0
         blocks[0, layout.POINT : layout.POINT + 3] = middle
         blocks[0, layout.FREQUENCY], blocks[0, layout.DAMPING_RATIO] = swing.frequency, DAMPING
+        blocks[0, layout.PENDULUM] = float(liquid)
         o = place.internal_block(model.cables, model.internal)
 
         def number(name: str, unit: str, nominal: float, std: float, entry: int, ratio: bool) -> Parameter:

@@ -32,7 +32,8 @@ FREQUENCY = 9  # Hz
 DAMPING_RATIO = 10
 COMPLIANCE = 11  # m/N (ceiling)
 STOP = 12  # m: a rider meets its stops this far from rest; 0: it has none
-INTERNAL_SIZE = 13
+PENDULUM = 13  # constant: 1 where a rider of two coordinates hangs instead of riding on springs
+INTERNAL_SIZE = 14
 RIDER = 0.0
 CEILING = 1.0
 

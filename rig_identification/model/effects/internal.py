@@ -10,9 +10,12 @@ equation along d_j, divided by m so that it holds for a massless passenger as we
 g_rest is gravity as the body feels it in its rest pose, where the rider's spring bears it.
 The body's ten numbers count the rider as fixed at a, so that the body feels the difference:
 point inertia and weight at rho less those at a, m 2 w x rho', and m d_k q_k''.
-A linear pendulum of length g/(2 pi f)^2 and a mass on horizontal springs obey the same
-equation: a liquid's first mode is a rider with two horizontal coordinates (Ibrahim,
-"Liquid Sloshing Dynamics", 2005, section 5.2).
+A liquid's first mode is a pendulum of length l = g/(2 pi f)^2 (Ibrahim, "Liquid Sloshing Dynamics",
+2005, section 5.2): a rider with two coordinates along d_1 and d_2 that hangs instead of riding on
+springs, so that it rises along n = d_1 x d_2 by l - s, s = (l^2 - q^2)^1/2, as it swings:
+    rho = a + sum d_k q_k + n (l - s),   t_k = d rho/d q_k = d_k + n q_k/s
+t_k stands for d_k above, g for g - g_rest, nothing for the spring, and the acceleration of rho
+gains n (q'.q'/s + (q.q')^2/s^3).
 
 A ceiling moves all upper hinges by d q. With compliance kappa = 1/k and f = (k/M)^(1/2)/2 pi
     q''/(2 pi f)^2 + 2 zeta q'/(2 pi f) + q = -kappa sum T_i u_i . d
@@ -25,6 +28,7 @@ import math
 
 from numba import njit
 
+from rig_identification.model.arithmetic import reciprocal, root
 from rig_identification.model.effects.place import EFFECTS_SIZE, REFERENCE_ROTATION, active
 from rig_identification.model.effects.point_mass import add_point_inertia
 from rig_identification.model.layout import (
@@ -41,6 +45,7 @@ from rig_identification.model.layout import (
     KIND,
     LEADER,
     MASS,
+    PENDULUM,
     POINT,
     RATE,
     STOP,
@@ -121,7 +126,31 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
     by = gy - (physics[t + 1] * g0 + physics[t + 4] * g1 + physics[t + 7] * g2)
     bz = gz - (physics[t + 2] * g0 + physics[t + 5] * g1 + physics[t + 8] * g2)
     px, py, pz = ax, ay, az
-    sx, sy, sz = 0.0 * ax, 0.0 * ax, 0.0 * ax
+    nothing = 0.0 * ax
+    sx, sy, sz = nothing, nothing, nothing
+    nx, ny, nz, per_s = nothing, nothing, nothing, nothing
+    qx, qy, qz = nothing, nothing, nothing
+    hangs = physics[lead + PENDULUM].real > 0.0
+    if hangs:
+        bx, by, bz = gx, gy, gz
+        o, p = lead, lead + INTERNAL_SIZE
+        nx = physics[o + AXIS + 1] * physics[p + AXIS + 2] - physics[o + AXIS + 2] * physics[p + AXIS + 1]
+        ny = physics[o + AXIS + 2] * physics[p + AXIS] - physics[o + AXIS] * physics[p + AXIS + 2]
+        nz = physics[o + AXIS] * physics[p + AXIS + 1] - physics[o + AXIS + 1] * physics[p + AXIS]
+        q0, q1 = x[BODY_STATE + leader], x[BODY_STATE + leader + 1]
+        v0, v1 = x[BODY_STATE + count + leader], x[BODY_STATE + count + leader + 1]
+        arm = root(g0 * g0 + g1 * g1 + g2 * g2) * reciprocal(omega * omega)
+        below = arm * arm - q0 * q0 - q1 * q1
+        if below.real < 0.05 * arm.real * arm.real:
+            # Past the horizontal no liquid swings: hold the geometry there
+            below = 0.05 * arm * arm
+        s = root(below)
+        per_s = reciprocal(s)
+        px, py, pz = px + nx * (arm - s), py + ny * (arm - s), pz + nz * (arm - s)
+        slope = (q0 * v0 + q1 * v1) * per_s
+        sx, sy, sz = nx * slope, ny * slope, nz * slope
+        curving = (v0 * v0 + v1 * v1 + slope * slope) * per_s
+        qx, qy, qz = nx * curving, ny * curving, nz * curving
     for k in range(leader, count):
         o = first + INTERNAL_SIZE * k
         if physics[o + KIND].real == CEILING or int(physics[o + LEADER].real) != leader:
@@ -136,16 +165,16 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
     # Acceleration of the passenger that does not answer to A, alpha, q''
     ex, ey, ez = wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px
     ex, ey, ez = ex + 2.0 * sx, ey + 2.0 * sy, ez + 2.0 * sz
-    cx, cy, cz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
+    cx, cy, cz = wy * ez - wz * ey + qx, wz * ex - wx * ez + qy, wx * ey - wy * ex + qz
     if active(mass):
         add_point_inertia(mass, px, py, pz, wx, wy, wz, K, r)
         add_point_inertia(-mass, ax, ay, az, wx, wy, wz, K, r)
         # Weight at rho less weight at a; Coriolis
         dx, dy, dz = px - ax, py - ay, pz - az
         fx, fy, fz = (
-            -2.0 * mass * (wy * sz - wz * sy),
-            -2.0 * mass * (wz * sx - wx * sz),
-            -2.0 * mass * (wx * sy - wy * sx),
+            -mass * (2.0 * (wy * sz - wz * sy) + qx),
+            -mass * (2.0 * (wz * sx - wx * sz) + qy),
+            -mass * (2.0 * (wx * sy - wy * sx) + qz),
         )
         r[0] += fx
         r[1] += fy
@@ -158,7 +187,12 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
         if physics[o + KIND].real == CEILING or int(physics[o + LEADER].real) != leader:
             continue
         row = 6 + cables + j
-        dx, dy, dz = physics[o + AXIS], physics[o + AXIS + 1], physics[o + AXIS + 2]
+        rise = x[BODY_STATE + j] * per_s
+        dx, dy, dz = (
+            physics[o + AXIS] + nx * rise,
+            physics[o + AXIS + 1] + ny * rise,
+            physics[o + AXIS + 2] + nz * rise,
+        )
         mx, my, mz = py * dz - pz * dy, pz * dx - px * dz, px * dy - py * dx
         K[row, 0] = dx
         K[row, 1] = dy
@@ -175,13 +209,16 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
         for k in range(leader, count):
             p = first + INTERNAL_SIZE * k
             if physics[p + KIND].real != CEILING and int(physics[p + LEADER].real) == leader:
+                rise = x[BODY_STATE + k] * per_s
                 K[row, 6 + cables + k] = (
-                    dx * physics[p + AXIS] + dy * physics[p + AXIS + 1] + dz * physics[p + AXIS + 2]
+                    dx * (physics[p + AXIS] + nx * rise)
+                    + dy * (physics[p + AXIS + 1] + ny * rise)
+                    + dz * (physics[p + AXIS + 2] + nz * rise)
                 )
         q, speed = x[BODY_STATE + j], x[BODY_STATE + count + j]
-        r[row] = (
-            dx * (bx - cx) + dy * (by - cy) + dz * (bz - cz) - omega * omega * q - 2.0 * zeta * omega * speed
-        )
+        r[row] = dx * (bx - cx) + dy * (by - cy) + dz * (bz - cz) - 2.0 * zeta * omega * speed
+        if not hangs:
+            r[row] -= omega * omega * q
         if stop.real > 0.0:
             r[row] += _stop_force(q, speed, stop)
 
