@@ -21,6 +21,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.riders import SWINGS, Swing, rider_candidate
+from rig_identification.mismatch.locate import devices_of, find_liar
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.sensor_errors import sensor_errors
@@ -74,7 +75,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
         parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0]
     )
     return [
-        *sensor_errors(rig, parameters),
+        *sensor_errors(rig, parameters, [d for d in devices_of(problem) if d != "exciter"]),
         *rig_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]
@@ -204,10 +205,19 @@ def trials(
     says: it is far from linear.
     """
     mass = mass_of(problem, evaluation)
+    far = misfit(evaluation) > FAR
+    if far:
+        problem, evaluation = worst_pieces(problem, evaluation)
+        notify("without each device in turn")
+        liar = find_liar(problem, evaluation)
+        if liar is not None:
+            # About the fit that does not hear it, what is wrong with it shows as it is
+            evaluation = evaluate(problem, liar.point) or evaluation
+            far = False
     promises = screen(problem, evaluation, candidates, mass)
     worthy = [p for p in promises if p.gain > needed_gain(p.candidate, len(candidates) + len(SWINGS))]
     worthy = [p for p in worthy if p.gain > WORTH * worthy[0].gain][:FITTED]
-    if misfit(evaluation) > FAR:
+    if far:
         seen = {p.candidate.label for p in worthy}
         worthy += [p for p in far_promises(problem, promises, mass) if p.candidate.label not in seen]
     if not worthy:

@@ -22,6 +22,7 @@ RANGE = {
     "clock": 0.05,
     "gain": 0.05,
     "zero": 0.05,
+    "lag": 0.02,
 }
 
 
@@ -195,11 +196,59 @@ def _clocks_and_exciter(parameters: ParameterSet) -> list[Candidate]:
     return out
 
 
-def sensor_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
-    """All sensor errors that this session's channels could have."""
+def _added(
+    effect: str, name: str, entries: tuple[int, ...], std: float, told: str, text: tuple[str, str], channel: str | None
+) -> Candidate:
+    """A time error that the ideal model has no doubt about."""
+    first, *others = entries
+    p = Parameter(name, "s", 0.0, std, "device", first, bounded=False, also=tuple(others))
+    where: dict[str, object] = {"channel": channel, "axis": None}
+    return Candidate(
+        effect, (p,), text[0], text[1], where, positive=effect == "sensor_lag", name_in_result=told
+    )
+
+
+def _time_errors(parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
+    """Lags of every device, late stamps of load cells, which keep the time where nothing is wrong."""
+    places = parameters.places
+    out = []
+    lag = (
+        "{channel} follows what it measures like a low-pass with a time constant of {value}.",
+        "Switch its filter off, or take its time constant from the data sheet into the model.",
+    )
+    late = (
+        "The stamps of {channel} are {value} late.",
+        "Synchronise the devices' clocks, or check for a buffer in the driver.",
+    )
+    for device in devices:
+        out.append(
+            _added(
+                "sensor_lag", f"{device}.lag", (places.lag(device),), RANGE["lag"], "time_constant", lag, device
+            )
+        )
+        if device in places.cables:
+            entry = (places.clock(device),)
+            out.append(
+                _added("clock_offset", f"{device}.clock", entry, RANGE["clock"], "offset", late, device)
+            )
+    cells = tuple(d for d in devices if d in places.cables)
+    if len(cells) > 1:
+        every = tuple(text.replace("{channel}", "all load cells").replace("follows", "follow") for text in lag)
+        entries = tuple(places.lag(c) for c in cells)
+        out.append(
+            _added(
+                "sensor_lag", "load_cells.lag", entries, RANGE["lag"], "time_constant", (every[0], every[1]), None
+            )
+        )
+    return out
+
+
+def sensor_errors(rig: Rig, parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
+    """All sensor errors that this session's channels could have. devices: those that the runs hold."""
     return [
         *_load_cells(rig, parameters),
         *_imu(rig, parameters),
         *_inclinometer(parameters),
         *_clocks_and_exciter(parameters),
+        *_time_errors(parameters, devices),
     ]

@@ -1,0 +1,130 @@
+"""Which witness lies: the model fitted without each device in turn, and without each stretch of time.
+
+An error of one device contradicts all others, which agree among themselves once it is not
+heard. A push contradicts everything for a moment, and nothing before and after. Physics that acts on the
+body all the time leaves no such subset in peace.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess, solve
+
+#: Factor on a device's noise that silences it, and on the exciter's.
+SILENT = 300.0
+#: Share of the excess that has to go with a device for it to be the one that lies.
+GONE = 0.97
+#: Steps of such a fit.
+STEPS = 6
+
+
+@dataclass(frozen=True)
+class Liar:
+    """A device without which everything else agrees."""
+
+    device: str
+    point: Point  # fitted without it
+    left: float  # mean square of the other devices' residuals
+
+
+def devices_of(problem: Problem) -> list[str]:
+    """Devices whose readings, or force, the runs hold."""
+    found = {c.device: None for run in problem.runs for c in run.channels}
+    exciter = ["exciter"] if any(run.exciter is not None for run in problem.runs) else []
+    return [*found, *exciter]
+
+
+def silenced(problem: Problem, device: str) -> Problem:
+    """The problem with one device's noise so large that it says nothing."""
+    runs = []
+    for run in problem.runs:
+        channels = tuple(
+            replace(c, noise=SILENT * c.noise) if c.device == device else c for c in run.channels
+        )
+        loud = SILENT if device == "exciter" else 1.0
+        runs.append(replace(run, channels=channels, exciter_noise=loud * run.exciter_noise))
+    rests = tuple(
+        replace(
+            rest,
+            channels=tuple(
+                replace(c, variance=SILENT**2 * c.variance) if c.device == device else c
+                for c in rest.channels
+            ),
+        )
+        for rest in problem.rests
+    )
+    return replace(problem, runs=tuple(runs), rests=rests)
+
+
+def find_liar(problem: Problem, evaluation: Evaluation) -> Liar | None:
+    """The device without which the others agree best, where nearly all excess goes with it."""
+    devices = devices_of(problem)
+    if len(devices) < 3:
+        return None
+    best: Liar | None = None
+    for device in devices:
+        try:
+            fitted, _ = solve(silenced(problem, device), evaluation.point, iterations=STEPS, tolerance=0.5)
+        except FloatingPointError:
+            continue
+        heard = [
+            run.residual[[part.channels[i].device != device for i in run.channel]]
+            for run, part in zip(fitted.runs, problem.runs, strict=True)
+        ]
+        rest = np.concatenate(heard)
+        if excess(fitted) < (1.0 - GONE) * excess(evaluation):
+            left = float(np.mean(rest**2))
+            if best is None or left < best.left:
+                best = Liar(device, fitted.point, left)
+    return best
+
+
+@dataclass(frozen=True)
+class Event:
+    """A stretch of one recording in which something acts that the rest of it does not show."""
+
+    recording: str
+    start: float  # s after the recording's start
+    end: float  # s
+    point: Point  # fitted without it, for all pieces
+    calm: tuple[int, ...]  # pieces that it leaves in peace
+
+
+#: An event may take up this share of the pieces, which fit so many times worse than the others.
+EVENT_SHARE = 0.4
+EVENT_CONTRAST = 3.0
+#: Mean square of the calm pieces' residuals up to which they count as explained.
+CALM = 1.15
+
+
+def find_event(problem: Problem, evaluation: Evaluation) -> Event | None:
+    """Pieces that alone cannot be fitted, next to each other in one run; None where there are no such."""
+    count = len(problem.runs)
+    if count < 4:
+        return None
+    order = np.argsort([float(np.mean(run.residual**2)) for run in evaluation.runs])
+    keep = sorted(int(i) for i in order[: count - int(EVENT_SHARE * count)])
+    calm_problem = replace(problem, runs=tuple(problem.runs[i] for i in keep))
+    calm_point = replace(evaluation.point, starts=tuple(evaluation.point.starts[i] for i in keep), latents=())
+    fitted, _ = solve(calm_problem, calm_point, iterations=10, tolerance=0.5)
+    if misfit(fitted) > CALM:
+        return None
+    starts = list(evaluation.point.starts)
+    for i, start in zip(keep, fitted.point.starts, strict=True):
+        starts[i] = start
+    point = replace(fitted.point, starts=tuple(starts))
+    whole = evaluate(problem, point)
+    if whole is None:
+        return None
+    squares = np.array([float(np.mean(run.residual**2)) for run in whole.runs])
+    bad = [i for i in range(count) if squares[i] > EVENT_CONTRAST * CALM]
+    names = {problem.runs[i].recording.name for i in bad}
+    if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
+        return None
+    first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
+    calm = tuple(i for i in range(count) if i not in bad)
+    return Event(names.pop(), first.offset, last.offset + last.grid.duration, point, calm)
