@@ -9,21 +9,21 @@ sensor's noise. A channel that contradicts the model then counts for as little a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.rest_evidence import RestEvidence
-from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 
 Array = NDArray[np.float64]
 
 #: Frequencies at which rigid rigs move, Hz.
 MOTION_BAND = 5.0
-#: Rounds of weighing and fitting.
-ROUNDS = 2
+#: Rounds of weighing and fitting, and steps of each fit.
+ROUNDS = 4
+STEPS = 4
 
 
 def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[tuple[str, str, int], float]:
@@ -65,12 +65,18 @@ def _reweighted_rest(evidence: RestEvidence, predicted: tuple[Array, ...]) -> Re
     return replace(evidence, channels=tuple(channels))
 
 
-def solve_cautiously(
-    parts: Problem, evaluation: Evaluation, notify: Callable[[int, float], None] | None = None
-) -> tuple[Problem, Evaluation]:
-    """A fit in pieces (segments.solve_in_pieces) weighed by the residuals themselves."""
+def solve_cautiously(parts: Problem, point: Point) -> tuple[Problem, Evaluation]:
+    """A fit in pieces (segments.in_pieces) weighed by the residuals themselves: the weighed problem, and it.
+
+    Weights start from the residuals at ``point`` and follow them down, so that what the model
+    lacks is never large against the weights and bends nothing on the way.
+    """
+    current = evaluate(parts, point)
+    if current is None:
+        return parts, solve(parts, point, iterations=ROUNDS * STEPS)[0]
+    weighed, evaluation = parts, current
     for _ in range(ROUNDS):
-        parts = reweighted(parts, evaluation)
-        point = Point(evaluation.point.theta, evaluation.point.starts, evaluation.point.rest_guesses)
-        evaluation, _ = solve(parts, point, iterations=10, notify=notify)
-    return parts, evaluation
+        weighed = reweighted(parts, current)
+        evaluation, _ = solve(weighed, current.point, iterations=STEPS, tolerance=0.5)
+        current = evaluate(parts, evaluation.point) or current
+    return weighed, evaluation

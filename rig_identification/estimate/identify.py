@@ -13,7 +13,7 @@ from rig_identification.estimate.cautious import solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
-from rig_identification.estimate.growing import fit_start_growing, solve_growing
+from rig_identification.estimate.growing import HOPELESS_SQUARE, fit_start_growing, misfit, solve_growing
 from rig_identification.estimate.launch import Launch, launch_state
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
@@ -21,7 +21,7 @@ from rig_identification.estimate.prediction import Bench, Linearised
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.scan import scan
 from rig_identification.estimate.segments import free_part, in_pieces, solve_in_pieces
-from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import State, rig_model
@@ -46,6 +46,7 @@ class Fitted:
     holdout_runs: tuple[Run, ...]
     holdouts: tuple[Linearised, ...]
     notes: tuple[str, ...] = ()
+    guess: Point | None = None  # where the fit started: everything about the rig as described
 
 
 def _silent(stage: str, fraction: float) -> None:
@@ -167,6 +168,7 @@ def fit_session(session: Session, progress: Progress = _silent) -> Fitted:
         tuple(run for run, _ in outcomes),
         tuple(linearised for _, linearised in outcomes),
         start.notes,
+        start.point,
     )
 
 
@@ -210,20 +212,13 @@ def scores(fitted: Fitted) -> Scores:
 
 @dataclass(frozen=True)
 class Ideal:
-    """The ideal model's fit, its verdict, and short pieces to look closer at where it fails."""
+    """The ideal model's fit, its verdict, and a cautious fit to short pieces where it fails."""
 
     fitted: Fitted
     scores: Scores
     mismatch: Mismatch
-    pieces: tuple[Problem, Point] | None
-
-    def careful(self, notify: Progress) -> tuple[Problem, Evaluation] | None:
-        """The cautious fit (cautious.py), where the ideal model fails."""
-        if self.pieces is None:
-            return None
-        notify("weighing each channel by its residual", 0.9)
-        parts, point = self.pieces
-        return solve_cautiously(parts, solve(parts, point, iterations=15)[0])
+    pieces: Problem | None  # the runs in short pieces
+    careful: tuple[Problem, Evaluation] | None  # their cautious fit (cautious.py)
 
 
 #: What the report says of numbers that come from the cautious fit.
@@ -235,17 +230,21 @@ CAUTION = (
 
 
 def fit_ideal(session: Session, notify: Progress) -> Ideal:
-    """Fit the ideal model, judge it, and cut the runs into short pieces where it fails."""
+    """Fit the ideal model, judge it, and fit short pieces cautiously where it fails."""
     fitted = fit_session(session, notify)
     found = scores(fitted)
     parameters = parameter_estimates(fitted.problem, fitted.evaluation)
     mismatch = judge(fitted, parameters, found.holdout, found.training, ORDINARY)
-    pieces = None
+    pieces, careful = None, None
     if mismatch.verdict == "unexplained" and fitted.problem.runs:
-        notify("fitting in short pieces", 0.7)
+        notify("fitting short pieces, each channel weighed by its residual", 0.7)
         point = fitted.evaluation.point
-        pieces = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
-    return Ideal(fitted, found, mismatch, pieces)
+        if fitted.guess is not None and misfit(fitted.evaluation) > HOPELESS_SQUARE:
+            # A model that lacks much bends everything to swallow it: start again from where nothing is bent
+            point = fitted.guess
+        pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
+        careful = solve_cautiously(pieces, start)
+    return Ideal(fitted, found, mismatch, pieces, careful)
 
 
 def compose(
@@ -279,7 +278,7 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     notify = progress or _silent
     ideal = fit_ideal(session, notify)
     notify("done", 1.0)
-    return compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful(notify))
+    return compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
 
 
 def error_in_sigma(fits) -> float:  # type: ignore[no-untyped-def]

@@ -44,11 +44,10 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     if found is not None and found.mismatch.verdict == "explained":
         answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, None)
         return replace(answer, figures={**answer.figures, "ideal": plain})
-    careful = ideal.careful(notify)
-    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, careful)
+    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
     if note is not None:
         plain = replace(plain, notes=(*plain.notes, note))
     if found is None:
         return plain
-    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful)
+    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, ideal.careful)
     return replace(answer, figures={**answer.figures, "ideal": plain})

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.growing import misfit, settled_starts
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess, solve
 
 #: Factor on a device's noise that silences it, and on the exciter's.
@@ -116,7 +116,9 @@ def find_event(problem: Problem, evaluation: Evaluation) -> Event | None:
     starts = list(evaluation.point.starts)
     for i, start in zip(keep, fitted.point.starts, strict=True):
         starts[i] = start
-    point = replace(fitted.point, starts=tuple(starts))
+    point = replace(fitted.point, starts=tuple(starts), latents=())
+    # Pieces that were not fitted start as suits the calm ones' body
+    point = replace(point, starts=settled_starts(problem, point))
     whole = evaluate(problem, point)
     if whole is None:
         return None

@@ -20,8 +20,8 @@ from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.riders import SWINGS, Swing, rider_candidate
 from rig_identification.mismatch.locate import devices_of, find_liar
+from rig_identification.mismatch.riders import SWINGS, Swing, rider_candidate
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.sensor_errors import sensor_errors
@@ -40,6 +40,8 @@ MOST_EFFECTS = 3
 WORTH = 0.05
 #: Pieces that hypotheses are tried on.
 TRIED = 4
+#: Log evidence that an effect has to gain.
+MEANT = 3.0
 TRIED_FAR = 2
 VERY_FAR = 5.0
 #: Mean square of whitened residuals below which nothing much is left, and how many times as much as the best
@@ -195,9 +197,17 @@ def _at_noise(trial: Trial) -> bool:
     return misfit(trial.evaluation) < AT_NOISE
 
 
+@dataclass(frozen=True)
+class Trials:
+    """Hypotheses fitted in full, most likely first, and the device that contradicts all others."""
+
+    done: list[Trial]
+    liar: str | None = None
+
+
 def trials(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate], limit: float, notify: Notify
-) -> list[Trial]:
+) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
     All get a few steps; the best few go on to their end, and where one reaches the noise only those
@@ -206,6 +216,7 @@ def trials(
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > FAR
+    liar = None
     if far:
         problem, evaluation = worst_pieces(problem, evaluation)
         notify("without each device in turn")
@@ -220,10 +231,12 @@ def trials(
     if far:
         seen = {p.candidate.label for p in worthy}
         worthy += [p for p in far_promises(problem, promises, mass) if p.candidate.label not in seen]
+    device = None if liar is None else liar.device
     if not worthy:
-        return []
+        return Trials([], device)
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
     problem, evaluation = worst_pieces(problem, evaluation)
+    needed = log_evidence(evaluation) + MEANT
     begun: list[Trial] = []
     for promise in worthy:
         notify(promise.candidate.label)
@@ -239,9 +252,9 @@ def trials(
             continue
         notify(trial.candidate.label)
         ended = finished(trial)
-        if ended is not None and beyond_doubt(ended, ordinary, limit):
+        if ended is not None and ended.evidence > needed and beyond_doubt(ended, ordinary, limit):
             done.append(ended)
-    return sorted(done, key=lambda t: -t.evidence)
+    return Trials(sorted(done, key=lambda t: -t.evidence), device)
 
 
 def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:

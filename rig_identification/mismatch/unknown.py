@@ -1,0 +1,115 @@
+"""What stands in for physics that no entry of the catalogue explains, or that acts once: a push, or unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.parameters import AXES
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.latent import MissingWrench, joined, missing_wrench, strongest_push
+from rig_identification.mismatch.law import law_of
+from rig_identification.mismatch.locate import Event
+from rig_identification.mismatch.riders import middle_of
+from rig_identification.model.motion import State
+from rig_identification.result import Finding
+
+Array = NDArray[np.float64]
+
+#: Relative uncertainty of a push's peak: it is an average over a tenth of a second.
+SMEARED = 0.02
+
+
+def missing_in(
+    problem: Problem, evaluation: Evaluation, rest: State, mass: float, which: list[int]
+) -> MissingWrench | None:
+    """The missing wrench in some of a problem's runs, those of the recording of the first."""
+    parts = []
+    for i in which:
+        if problem.runs[i].recording.name == problem.runs[which[0]].recording.name:
+            found = missing_wrench(problem.bench, problem.runs[i], evaluation.point.theta, rest, mass)
+            if found is not None:
+                parts.append(found)
+    return joined(parts) if parts else None
+
+
+def push_finding(
+    problem: Problem, evaluation: Evaluation, rest: State, mass: float, event: Event
+) -> tuple[Finding, float, float] | None:
+    """The event as an external force: the finding without evidence, and when it starts and ends (s)."""
+    inside = [
+        i
+        for i, run in enumerate(problem.runs)
+        if run.recording.name == event.recording and event.start - 1e-6 <= run.offset < event.end - 1e-6
+    ]
+    missing = missing_in(problem, evaluation, rest, mass, inside)
+    if missing is None:
+        return None
+    push = strongest_push(missing, middle_of(problem.bench.rig))
+    axis = int(np.argmax(np.abs(push.peak)))
+    value = float(push.peak[axis])
+    std = float(np.hypot(push.std, SMEARED * push.size))
+    times = [{"recording": event.recording, "start": round(push.start, 3), "end": round(push.end, 3)}]
+    where: dict[str, object] = {
+        "channel": None,
+        "axis": AXES[axis],
+        "position": [float(v) for v in push.point],
+        "times": times,
+    }
+    told = {"peak_force": {"value": value, "std": std, "unit": "N"}}
+    told |= {
+        f"peak_force_{a}": {"value": float(push.peak[i]), "std": std, "unit": "N"} for i, a in enumerate(AXES)
+    }
+    text = (
+        f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with up to "
+        f"{push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These seconds are left "
+        "out of the fit. Keep people and draughts away from the rig, or cut the recording there."
+    )
+    return Finding("external_force", where, told, {}, text), push.start, push.end
+
+
+def unknown_finding(
+    problem: Problem, evaluation: Evaluation, rest: State, mass: float, device: str | None
+) -> Finding | None:
+    """Where, when and how strong whatever is left is, and the wrench over time that stands in its place."""
+    squares = [float(np.sum(run.residual**2) - run.residual.size) for run in evaluation.runs]
+    order = [int(i) for i in np.argsort(squares)[::-1][:3]]
+    missing = missing_in(problem, evaluation, rest, mass, order)
+    if missing is None:
+        return None
+    middle = middle_of(problem.bench.rig)
+    push = strongest_push(missing, middle)
+    world = np.einsum("nij,nj->ni", missing.R_world_body, missing.wrench[:, :3])
+    strength = np.sqrt(np.mean((world - np.mean(world, axis=0)) ** 2, axis=0))
+    about = missing.wrench[:, 3:] - np.cross(middle, missing.wrench[:, :3])
+    moment = np.sqrt(np.mean((about - np.mean(about, axis=0)) ** 2, axis=0))
+    axis = AXES[int(np.argmax(strength))]
+    law = law_of(missing)
+    where: dict[str, object] = {"channel": device, "axis": axis}
+    where["times"] = [
+        {
+            "recording": missing.recording,
+            "start": round(float(missing.time[0]), 3),
+            "end": round(float(missing.time[-1]), 3),
+        }
+    ]
+    where["position"] = [float(v) for v in push.point]
+    if device is not None:
+        text = f"Everything but {device} agrees: what {device} says is wrong in a way that no entry of the catalogue has."
+    else:
+        text = (
+            f"Something acts on the body that no entry of the catalogue has: about {np.max(strength):.3g} N "
+            f"(root mean square), mostly along {axis}, and {np.max(moment):.3g} N m; strongest at "
+            f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
+        )
+        text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."
+    told = {
+        "force": {"value": float(np.max(strength)), "std": float(push.std), "unit": "N"},
+        "moment": {"value": float(np.max(moment)), "std": float("nan"), "unit": "N*m"},
+        "peak_force": {"value": push.size, "std": float(push.std), "unit": "N"},
+    }
+    told["moment"]["std"] = float(np.std(about[:, int(np.argmax(moment))]) / np.sqrt(max(1, about.shape[0])))
+    if not np.isfinite(push.std):
+        for part in ("force", "peak_force"):
+            told[part]["std"] = float(np.max(strength))
+    return Finding("unknown", where, told, {}, text)

@@ -1,0 +1,48 @@
+"""Whole runs with the effects that were found: fitted, and predicted where they are held out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.growing import fit_start_growing
+from rig_identification.estimate.identify import Fitted
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.prediction import Linearised, model_at
+from rig_identification.estimate.solve import Point, Problem, solve
+from rig_identification.model.equilibrium import find_rest
+from rig_identification.model.motion import State
+
+
+def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fitted:
+    """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``, and predict the held-out runs."""
+    guess = (*point.rest_guesses, *point.starts)[0]
+    rest = find_rest(model_at(whole.bench.parameters, point.theta), guess).state
+    begun = {
+        (run.recording.name, run.offset): state for run, state in zip(parts.runs, point.starts, strict=True)
+    }
+    starts = tuple(
+        begun.get((run.recording.name, run.offset)) or launch_state(whole.bench, run, point.theta, rest)
+        for run in whole.runs
+    )
+    evaluation, converged = solve(whole, Point(point.theta, starts, point.rest_guesses), iterations=20)
+    held_runs, held = _predicted(ideal, whole, evaluation.point.theta, rest)
+    return replace(
+        ideal,
+        problem=whole,
+        evaluation=evaluation,
+        converged=converged,
+        holdout_runs=tuple(held_runs),
+        holdouts=tuple(held),
+    )
+
+
+def _predicted(ideal: Fitted, whole: Problem, theta, rest: State) -> tuple[list[Run], list[Linearised]]:  # type: ignore[no-untyped-def]
+    runs, predictions = [], []
+    for run in ideal.holdout_runs:
+        state = launch_state(whole.bench, run, theta, rest)
+        result = fit_start_growing(whole.bench, run, theta, state)
+        if result is not None:
+            runs.append(run)
+            predictions.append(result[0])
+    return runs, predictions
