@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.observability import invert_information
+from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, linearise_run
 from rig_identification.estimate.whiteness import Band, bands
 from rig_identification.result import Mismatch, ParameterEstimate
@@ -65,6 +68,25 @@ def predictive_residual(fitted: Fitted, full: Linearised) -> Array:
     return np.asarray(full.residual - full.jacobian @ step)
 
 
+def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
+    """Doubts at their bound that the recordings significantly press further out.
+
+    Of many doubts one or the other lies near three tolerances by chance: what counts is the gain in log
+    posterior if it were let go, against what chance gives (Bonferroni).
+    """
+    parameters, evaluation = fitted.problem.bench.parameters, fitted.evaluation
+    spread = invert_information(evaluation.information)
+    limit = 0.5 * float(chi2.isf(FALSE_ALARM / max(1, len(parameters.free)), 1))
+    out = set()
+    for i, p in enumerate(parameters.free, start=INERTIAL):
+        theta, gradient = evaluation.point.theta[i], evaluation.gradient[i]
+        outward = theta * gradient > 0.0
+        at_bound = p.bounded and not p.ratio and abs(theta) >= ordinary * (1.0 - 1e-6)
+        if at_bound and outward and 0.5 * gradient**2 * spread[i, i] > limit:
+            out.add(p.name)
+    return out
+
+
 def judge(
     fitted: Fitted,
     parameters: tuple[ParameterEstimate, ...],
@@ -81,7 +103,8 @@ def judge(
         full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
         if full is not None:
             witnesses += residual_witnesses(run, full, predictive_residual(fitted, full))
-    beyond = [p for p in parameters if abs(p.value - p.nominal) >= ordinary * p.prior_std * (1.0 - 1e-6)]
+    pressed = _pressed(fitted, ordinary)
+    beyond = [p for p in parameters if p.name in pressed]
     reasons = []
     if witnesses:
         worst = min(witnesses, key=lambda w: w.band.log10_p)
