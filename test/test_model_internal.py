@@ -74,15 +74,15 @@ def energy(model: RigModel, motion: Motion) -> Array:
         3, 3
     )
     blocks = model.physics[place.internal_block(n, 0) :].reshape(count, layout.INTERNAL_SIZE)
-    I = np.array([[ten[4], ten[5], ten[6]], [ten[5], ten[7], ten[8]], [ten[6], ten[8], ten[9]]])
+    about_datum = np.array([[ten[4], ten[5], ten[6]], [ten[5], ten[7], ten[8]], [ten[6], ten[8], ten[9]]])
     total = np.zeros(motion.nodes)
     for k in range(motion.nodes):
         x, R = motion.states[k], motion.R_world_body[k]
         v, w, q, speed = R.T @ x[6:9], x[9:12], x[12 : 12 + count], x[12 + count :]
-        total[k] = 0.5 * ten[0] * v @ v + v @ np.cross(w, ten[1:4]) + 0.5 * w @ I @ w
+        total[k] = 0.5 * ten[0] * v @ v + v @ np.cross(w, ten[1:4]) + 0.5 * w @ about_datum @ w
         total[k] -= gravity @ (ten[0] * x[:3] + R @ ten[1:4])
         for j, b in enumerate(blocks):
-            axis, omega = b[layout.AXIS : layout.AXIS + 3], 2.0 * np.pi * b[layout.FREQUENCY]
+            omega = 2.0 * np.pi * b[layout.FREQUENCY]
             if b[layout.KIND] == layout.CEILING:
                 total[k] += 0.5 / b[layout.COMPLIANCE] * (q[j] ** 2 + (speed[j] / omega) ** 2)
             elif int(b[layout.LEADER]) == j:

@@ -1,4 +1,4 @@
-"""The session with what was left out in the model: located, named, fitted, judged on the held-out run, told."""
+"""The session with what was left out in the model: located, named, fitted, judged on held-out runs, told."""
 
 from __future__ import annotations
 
@@ -87,7 +87,11 @@ def _named(ideal: Fitted, search: _Search, notify: Notify) -> Explained | None:
         left = [c for c in candidates if c.label not in {t.candidate.label for t in search.found}]
         at = (step + 0.5) / (MOST_EFFECTS + 1)
         tried = trials(
-            search.here, search.evaluation, left, ORDINARY, lambda label, at=at: notify(f"search: {label}", at)  # type: ignore[misc]
+            search.here,
+            search.evaluation,
+            left,
+            ORDINARY,
+            lambda label, at=at: notify(f"search: {label}", at),  # type: ignore[misc]
         )
         search.liar = search.liar or tried.liar
         if not tried.done:
@@ -115,11 +119,9 @@ def _named(ideal: Fitted, search: _Search, notify: Notify) -> Explained | None:
 
 
 def _whole(ideal: Fitted, search: _Search) -> Explained:
-    last = search.found[-1]
     whole = extended(search.problem, tuple(t.candidate for t in search.found))
     known = search.evaluation.point
     point = replace(known, theta=carried(whole, search.here, known).theta)
-    _ = last
     fitted = fit_whole(ideal, whole, search.here, point)
     return Explained(fitted, _mismatch(ideal, fitted, search))
 
@@ -227,7 +229,9 @@ def _unexplained(
         ).explanation
         if partly:
             named = ", ".join(str(p["effect"]) for p in partly)
-            explanation += f" {named} would take away {100 * max(share, 0.0):.0f} % of it, which does not convince."
+            explanation += (
+                f" {named} would take away {100 * max(share, 0.0):.0f} % of it, which does not convince."
+            )
     if unknown is None and not kept:
         return None
     before = scores(ideal).holdout

@@ -37,7 +37,9 @@ def features(missing: MissingWrench) -> dict[str, Array]:
     """Motions that a wrench can follow, (N,) each."""
     x = missing.states
     place = x[:, :3] - np.mean(x[:, :3], axis=0)
-    turn = np.stack([missing.R_world_body[:, 2, 1], missing.R_world_body[:, 0, 2], missing.R_world_body[:, 1, 0]])
+    turn = np.stack(
+        [missing.R_world_body[:, 2, 1], missing.R_world_body[:, 0, 2], missing.R_world_body[:, 1, 0]]
+    )
     turn = turn.T - np.mean(turn.T, axis=0)
     out: dict[str, Array] = {"time": missing.time - np.mean(missing.time)}
     for i, a in enumerate("xyz"):

@@ -79,7 +79,9 @@ def _adding(problem: Problem, candidates: list[Candidate]) -> Problem:
     return replace(problem, bench=replace(problem.bench, parameters=parameters))
 
 
-def screen(problem: Problem, evaluation: Evaluation, candidates: list[Candidate], mass: float) -> list[Promise]:
+def screen(
+    problem: Problem, evaluation: Evaluation, candidates: list[Candidate], mass: float
+) -> list[Promise]:
     """Promises of all candidates, and of riders and supports, about ``evaluation``, best first.
 
     mass: kg, of the body.
@@ -101,9 +103,7 @@ def screen(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
     return sorted(out, key=lambda promise: -promise.gain)
 
 
-def _base(
-    wide: Problem, point: Point, full: Evaluation, added: set[str], probed: int
-) -> NDArray[np.int64]:
+def _base(wide: Problem, point: Point, full: Evaluation, added: set[str], probed: int) -> NDArray[np.int64]:
     """Unknowns that are free without any candidate. probed: states that probes add."""
     at_bound = np.zeros(full.information.shape[0], dtype=bool)
     for i, q in enumerate(wide.bench.parameters.free, start=INERTIAL):

@@ -48,7 +48,8 @@ VERY_FAR = 5.0
 #: a hypothesis may have left after its first steps to be its rival even so.
 AT_NOISE = 1.05
 RIVAL = 10.0
-#: Steps of a first, short fit (more where the model itself changes) and of one to the end, and how many hypotheses get that far.
+#: Steps of a first, short fit (more where the model itself changes) and of one to the end, and how many
+#: hypotheses get that far.
 FIRST_STEPS = 4
 CHANGED_STEPS = 9
 LAST_STEPS = 20
@@ -258,7 +259,7 @@ def trials(
 
 
 def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:
-    """What gives way, and the best rider to one side and to all, without regard to what screening promises."""
+    """What gives way, and the best rider to one side and to all, whatever screening promises of them."""
     rig, model = problem.bench.rig, problem.bench.parameters.model
     if model.internal or not np.all(model.modes == RIGID):
         return []
@@ -278,7 +279,9 @@ def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list
         o = {p.name: p for p in first.candidate.parameters}
         swing = Swing("xy", o["sprung_mass.frequency"].nominal)
         at = np.array([o[f"sprung_mass.position.{a}"].nominal for a in AXES])
-        out.append(Promise(*_with_gain(rider_candidate(problem, swing, mass, first.values["sprung_mass.mass"], at))))
+        out.append(
+            Promise(*_with_gain(rider_candidate(problem, swing, mass, first.values["sprung_mass.mass"], at)))
+        )
     return out
 
 

@@ -197,7 +197,13 @@ def _clocks_and_exciter(parameters: ParameterSet) -> list[Candidate]:
 
 
 def _added(
-    effect: str, name: str, entries: tuple[int, ...], std: float, told: str, text: tuple[str, str], channel: str | None
+    effect: str,
+    name: str,
+    entries: tuple[int, ...],
+    std: float,
+    told: str,
+    text: tuple[str, str],
+    channel: str | None,
 ) -> Candidate:
     """A time error that the ideal model has no doubt about."""
     first, *others = entries
@@ -223,7 +229,13 @@ def _time_errors(parameters: ParameterSet, devices: list[str]) -> list[Candidate
     for device in devices:
         out.append(
             _added(
-                "sensor_lag", f"{device}.lag", (places.lag(device),), RANGE["lag"], "time_constant", lag, device
+                "sensor_lag",
+                f"{device}.lag",
+                (places.lag(device),),
+                RANGE["lag"],
+                "time_constant",
+                lag,
+                device,
             )
         )
         if device in places.cables:
@@ -233,11 +245,19 @@ def _time_errors(parameters: ParameterSet, devices: list[str]) -> list[Candidate
             )
     cells = tuple(d for d in devices if d in places.cables)
     if len(cells) > 1:
-        every = tuple(text.replace("{channel}", "all load cells").replace("follows", "follow") for text in lag)
+        every = tuple(
+            text.replace("{channel}", "all load cells").replace("follows", "follow") for text in lag
+        )
         entries = tuple(places.lag(c) for c in cells)
         out.append(
             _added(
-                "sensor_lag", "load_cells.lag", entries, RANGE["lag"], "time_constant", (every[0], every[1]), None
+                "sensor_lag",
+                "load_cells.lag",
+                entries,
+                RANGE["lag"],
+                "time_constant",
+                (every[0], every[1]),
+                None,
             )
         )
     return out

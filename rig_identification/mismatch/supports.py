@@ -72,7 +72,9 @@ def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, prob
                 names, (layout.FREQUENCY, layout.DAMPING_RATIO), strict=True
             )
         ]
-        return model.with_internal(_block(axis, PROBE_DAMPING if probe else DAMPING)), (compliance,) if probe else (compliance, *more)
+        return model.with_internal(_block(axis, PROBE_DAMPING if probe else DAMPING)), (
+            compliance,
+        ) if probe else (compliance, *more)
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
         compliance = values[f"ceiling.compliance.{a}"]
@@ -112,9 +114,7 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float, stiffness: float) -
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
         def shared(name: str, unit: str, nominal: float, std: float, entry: int) -> Parameter:
             first, *others = (o + entry for o in entries)
-            return Parameter(
-                name, unit, nominal, std, "physics", first, False, tuple(others), ratio=True
-            )
+            return Parameter(name, unit, nominal, std, "physics", first, False, tuple(others), ratio=True)
 
         elastic = replace(
             model,
@@ -145,7 +145,7 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float, stiffness: float) -
         tell=told,
         build=build,
         settle=stretched,
-        experiment="measure the rig's height with and without a known weight, at the hinges and at the ceiling",
+        experiment="measure how far hinges and ceiling sink under a known weight",
     )
 
 
@@ -160,9 +160,7 @@ def stretched(problem: Problem, point: Point, evaluation: Evaluation) -> Point:
             o = layout.cable_offset(i)
             strain = max(tension[i], 0.0) / physics[o + layout.AXIAL_STIFFNESS]
             physics[o + layout.LENGTH] *= 1.0 + strain
-        rigid = replace(
-            model.with_physics(physics), modes=np.full(n, layout.RIGID, dtype=np.int64)
-        )
+        rigid = replace(model.with_physics(physics), modes=np.full(n, layout.RIGID, dtype=np.int64))
         return on_cables(rigid, state)
 
     starts = tuple(

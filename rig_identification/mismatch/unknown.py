@@ -1,4 +1,4 @@
-"""What stands in for physics that no entry of the catalogue explains, or that acts once: a push, or unknown."""
+"""What stands in for physics that acts once, or that no entry of the catalogue explains: a push, or unknown."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ def push_finding(
         f"peak_force_{a}": {"value": float(push.peak[i]), "std": std, "unit": "N"} for i, a in enumerate(AXES)
     }
     text = (
-        f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with up to "
-        f"{push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These seconds are left "
-        "out of the fit. Keep people and draughts away from the rig, or cut the recording there."
+        f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with up "
+        f"to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These seconds "
+        "are left out of the fit. Keep people and draughts away from the rig, or cut the recording there."
     )
     return Finding("external_force", where, told, {}, text), push.start, push.end
 
@@ -95,7 +95,7 @@ def unknown_finding(
     ]
     where["position"] = [float(v) for v in push.point]
     if device is not None:
-        text = f"Everything but {device} agrees: what {device} says is wrong in a way that no entry of the catalogue has."
+        text = f"Everything but {device} agrees: it is wrong in a way that no entry of the catalogue has."
     else:
         text = (
             f"Something acts on the body that no entry of the catalogue has: about {np.max(strength):.3g} N "

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.growing import fit_start_growing
 from rig_identification.estimate.identify import Fitted
@@ -15,7 +18,7 @@ from rig_identification.model.motion import State
 
 
 def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fitted:
-    """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``, and predict the held-out runs."""
+    """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``; predict the held-out runs."""
     guess = (*point.rest_guesses, *point.starts)[0]
     rest = find_rest(model_at(whole.bench.parameters, point.theta), guess).state
     begun = {
@@ -37,7 +40,9 @@ def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fi
     )
 
 
-def _predicted(ideal: Fitted, whole: Problem, theta, rest: State) -> tuple[list[Run], list[Linearised]]:  # type: ignore[no-untyped-def]
+def _predicted(
+    ideal: Fitted, whole: Problem, theta: NDArray[np.float64], rest: State
+) -> tuple[list[Run], list[Linearised]]:
     runs, predictions = [], []
     for run in ideal.holdout_runs:
         state = launch_state(whole.bench, run, theta, rest)

@@ -121,7 +121,7 @@ def update_reference(reference, x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def project_state(physics, modes, x, reference):  # type: ignore[no-untyped-def]
-    """Move state x (12 + 2 s,) and reference (3, 3) onto the rigid cables' manifold; returns max |l - L| before."""
+    """Move state x (12 + 2 s,) and reference (3, 3) onto the cables' manifold; returns max |l - L| before."""
     n = modes.shape[0]
     G = np.empty((n, 6))
     gap = np.empty(n)

@@ -56,7 +56,7 @@ def rest_defect(physics, modes, mount, x, R, tension, K, r, gradient, out):  # t
 
 @njit(cache=True)
 def rest_jacobian(physics, modes, mount, x, reference, tension, directions):  # type: ignore[no-untyped-def]
-    """(6 + n + s, 6 + n + s) in pose, tensions and internal coordinates, and (6 + n + s, d) in ``directions``."""
+    """(m, m), m = 6 + n + s, in pose, tensions and internal coordinates, and (m, d) in ``directions``."""
     n = modes.shape[0]
     behind = 6 + n
     size = behind + (x.shape[0] - layout.BODY_STATE) // 2

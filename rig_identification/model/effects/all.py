@@ -26,7 +26,7 @@ from rig_identification.model.layout import CABLE_SIZE, CABLES
 
 @njit(cache=True)
 def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
-    """Whether any effect answers to the body's numbers, to gravity, to the exciter's mount, to the cables'."""
+    """Whether any effect answers to the body's numbers, gravity, the exciter's mount, the cables' numbers."""
     block = CABLES + CABLE_SIZE * modes.shape[0]
     if physics.shape[0] <= block:
         return False, False, False, False
