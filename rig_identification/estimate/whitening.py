@@ -20,7 +20,8 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
 
     node (m,): ascending node index of each row. H (m, X), D (m, 6): response of the row to
     state (X = 12 and twice the internal coordinates) and wrench. variance (m,): sensor noise of
-    the row. Q (N, 6, 6): covariance of the wrench over each interval. latent (N, 6): wrench that the nominal motion already holds of
+    the row. Q (N, 6, 6): covariance of the wrench over each interval. latent (N, 6):
+    wrench that the nominal motion already holds of
     this noise, whose mean is zero all the same. Column 0 is measured less predicted, the others derivatives
     of the prediction.
     """

@@ -57,10 +57,10 @@ def missing_wrench(bench: Bench, run: Run, theta: Array, rest: State, mass: floa
     corrections, wrenches, _ = smoothed(linearised, P)
     width = max(1, round(AVERAGED / step))
     kernel = np.ones(width) / width
-    averaged = np.stack([np.convolve(w, kernel, mode="same") for w in wrenches.T], axis=1)
+    averaged: Array = np.stack([np.convolve(w, kernel, mode="same") for w in wrenches.T], axis=1)
     return MissingWrench(
         run.recording.name,
-        run.offset + step * np.arange(run.grid.nodes),
+        np.asarray(run.offset + step * np.arange(run.grid.nodes), dtype=np.float64),
         averaged,
         linearised.motion.R_world_body,
         linearised.motion.states[:, :12] + corrections[:, :12],

@@ -193,9 +193,9 @@ def _riders(
     about[1:, 0] = center
     best: dict[str, Promise] = {}
     for k, swing in enumerate(SWINGS):
-        mine = slice(WIDTH * k, WIDTH * (k + 1))
-        matrix = about.T @ (own[k] - seen[:, mine].T @ solved[:, mine]) @ about
-        right = about.T @ left[mine]
+        chosen = slice(WIDTH * k, WIDTH * (k + 1))
+        matrix = about.T @ (own[k] - seen[:, chosen].T @ solved[:, chosen]) @ about
+        right = about.T @ left[chosen]
         alone = right[0] / (matrix[0, 0] + 1.0 / (0.05 * mass) ** 2)
         if alone <= 0.0:
             continue

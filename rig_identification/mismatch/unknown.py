@@ -1,4 +1,4 @@
-"""What stands in for physics that acts once, or that no entry of the catalogue explains: a push, or unknown."""
+"""What stands in for physics that acts once, or that no entry of the catalogue explains."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def push_finding(
     }
     text = (
         f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with up "
-        f"to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These seconds "
-        "are left out of the fit. Keep people and draughts away from the rig, or cut the recording there."
+        f"to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These "
+        "seconds are left out of the fit. Keep people and draughts away from the rig, or cut the recording there."
     )
     return Finding("external_force", where, told, {}, text), push.start, push.end
 

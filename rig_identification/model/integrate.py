@@ -388,7 +388,8 @@ def propagate(  # type: ignore[no-untyped-def]
     """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
 
     x (12 + 2 s,) and reference (3, 3): start, destroyed; s: internal coordinates.
-    forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between. wrenches (N, 6): further wrench,
+    forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between.
+    wrenches (N, 6): further wrench,
     body axes, held over the interval. directions (d,): entries of ``physics`` to
     differentiate in (EXCITER_CLOCK: clock). start_columns (X, b + d): derivative of the
     start state, X = 12 + 2 s, in b start coordinates and the d directions.

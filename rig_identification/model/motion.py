@@ -134,7 +134,7 @@ class State:
         return np.concatenate([self.position, np.zeros(3), self.velocity, self.rate, inner])
 
     def moved(self, increment: Array) -> State:
-        """State displaced by (12 + 2 s,): position (world), rotation (body, right), velocity, rate, q, dq/dt."""
+        """State displaced by (12 + 2 s,): position (world), rotation (body, right), velocity, rate, q, q'."""
         return State(
             position=self.position + increment[:3],
             R_world_body=self.R_world_body @ Rotation.from_rotvec(increment[3:6]).as_matrix(),
