@@ -244,6 +244,9 @@ def trials(
         trial = attempt(problem, evaluation, promise)
         if trial is not None:
             begun.append(trial)
+            if far and _at_noise(trial):
+                # From far off nothing reaches the noise by chance
+                break
     begun.sort(key=lambda t: -t.evidence)
     done: list[Trial] = []
     for trial in begun:

@@ -61,9 +61,10 @@ def push_finding(
         f"peak_force_{a}": {"value": float(push.peak[i]), "std": std, "unit": "N"} for i, a in enumerate(AXES)
     }
     text = (
-        f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with up "
-        f"to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These "
-        "seconds are left out of the fit. Keep people and draughts away from the rig, or cut the recording there."
+        f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with "
+        f"up to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These "
+        "seconds are left out of the fit. Keep people and draughts away from the rig, or cut the recording "
+        "there."
     )
     return Finding("external_force", where, told, {}, text), push.start, push.end
 
