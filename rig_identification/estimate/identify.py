@@ -13,16 +13,18 @@ from rig_identification.estimate.cautious import solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import HOPELESS_SQUARE, fit_start_growing, misfit, solve_growing
 from rig_identification.estimate.launch import Launch, launch_state
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
-from rig_identification.estimate.prediction import Bench, Linearised
+from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.scan import scan
 from rig_identification.estimate.segments import free_part, in_pieces, solve_in_pieces
-from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.verdict import judge
+from rig_identification.estimate.whole import fit_whole
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import State, rig_model
 from rig_identification.recording import Session
@@ -33,20 +35,6 @@ Progress = Callable[[str, float], None]
 
 #: The ideal model may differ from its description by so many tolerances (recording contract).
 ORDINARY = 3.0
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A solved problem and how its held-out runs came out."""
-
-    problem: Problem
-    evaluation: Evaluation
-    converged: bool
-    rest: State  # pose at rest, roughly
-    holdout_runs: tuple[Run, ...]
-    holdouts: tuple[Linearised, ...]
-    notes: tuple[str, ...] = ()
-    guess: Point | None = None  # where the fit started: everything about the rig as described
 
 
 def _silent(stage: str, fraction: float) -> None:
@@ -232,9 +220,7 @@ CAUTION = (
 def fit_ideal(session: Session, notify: Progress) -> Ideal:
     """Fit the ideal model, judge it, and fit short pieces cautiously where it fails."""
     fitted = fit_session(session, notify)
-    found = scores(fitted)
-    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
-    mismatch = judge(fitted, parameters, found.holdout, found.training, ORDINARY)
+    found, mismatch = _judged(fitted)
     pieces, careful = None, None
     if mismatch.verdict == "unexplained" and fitted.problem.runs:
         notify("fitting short pieces, each channel weighed by its residual", 0.7)
@@ -244,7 +230,21 @@ def fit_ideal(session: Session, notify: Progress) -> Ideal:
             point = fitted.guess
         pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
         careful = solve_cautiously(pieces, start)
+        again = evaluate(pieces, careful[1].point)
+        if again is not None and misfit(again) < HOPELESS_SQUARE < misfit(fitted.evaluation):
+            # Short pieces fit: it was the way to the whole run's fit that failed, not the model
+            notify("fitting whole runs again", 0.9)
+            fitted = fit_whole(fitted, fitted.problem, pieces, careful[1].point)
+            found, mismatch = _judged(fitted)
+            if mismatch.verdict == "none":
+                pieces, careful = None, None
     return Ideal(fitted, found, mismatch, pieces, careful)
+
+
+def _judged(fitted: Fitted) -> tuple[Scores, Mismatch]:
+    found = scores(fitted)
+    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
+    return found, judge(fitted, parameters, found.holdout, found.training, ORDINARY)
 
 
 def compose(

@@ -17,7 +17,7 @@ from rig_identification.estimate.whiteness import Band, bands
 from rig_identification.result import Mismatch, ParameterEstimate
 
 if TYPE_CHECKING:
-    from rig_identification.estimate.identify import Fitted
+    from rig_identification.estimate.fitted import Fitted
 
 Array = NDArray[np.float64]
 

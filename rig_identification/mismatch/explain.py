@@ -8,16 +8,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.identify import ORDINARY, Fitted, Ideal, parameter_estimates, scores
+from rig_identification.estimate.identify import ORDINARY, Ideal, parameter_estimates, scores
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.estimate.verdict import judge
+from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.locate import Event, find_event
 from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import MOST_EFFECTS, Trial, adopted, catalogue, mass_of, trials
 from rig_identification.mismatch.unknown import push_finding, unknown_finding
-from rig_identification.mismatch.whole import fit_whole
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]

@@ -1,4 +1,4 @@
-"""Whole runs with the effects that were found: fitted, and predicted where they are held out."""
+"""Whole runs from a fit to their pieces: fitted, and predicted where they are held out."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import fit_start_growing
-from rig_identification.estimate.identify import Fitted
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.prediction import Linearised, model_at
 from rig_identification.estimate.solve import Point, Problem, solve

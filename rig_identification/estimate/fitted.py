@@ -1,0 +1,24 @@
+"""A solved session: what was fitted, how it came out, and how it predicts what was held out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.prediction import Linearised
+from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.model.motion import State
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A solved problem and how its held-out runs came out."""
+
+    problem: Problem
+    evaluation: Evaluation
+    converged: bool
+    rest: State  # pose at rest, roughly
+    holdout_runs: tuple[Run, ...]
+    holdouts: tuple[Linearised, ...]
+    notes: tuple[str, ...] = ()
+    guess: Point | None = None  # where the fit started: everything about the rig as described
