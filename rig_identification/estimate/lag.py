@@ -16,6 +16,22 @@ from scipy.signal import lfilter
 Array = NDArray[np.float64]
 
 
+#: How far a lagging device may be from its steady answer when a run starts, in std of what it shows.
+UNSETTLED = 3.0
+
+
+def unsettled(step: float, tau: float, node: NDArray[np.int64], values: Array) -> Array:
+    """(g, w) variance that a device of time constant ``tau`` (s) brings from before the run.
+
+    node (g,): node of each sample. values (g, w): samples. What it measured then is not known: a body
+    that is let go jumps from one load to another.
+    """
+    if tau <= 0.0:
+        return np.zeros_like(values)
+    away = UNSETTLED * np.std(values, axis=0) * np.exp(-step * node / tau)[:, None]
+    return np.asarray(away**2)
+
+
 def lagged(step: float, tau: float, values: Array) -> Array:
     """What a device of time constant ``tau`` (s) shows of ``values`` (N, c), ``step`` seconds apart."""
     if tau == 0.0:

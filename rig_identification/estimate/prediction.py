@@ -10,7 +10,7 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Channel, Run
-from rig_identification.estimate.lag import lagged
+from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
 from rig_identification.estimate.sampling import interpolation, jumps_of, node_values, rate_of_change
 from rig_identification.estimate.whitening import smooth, whiten
@@ -239,6 +239,7 @@ def linearise_run(
             readings[channel.device] = read_device(
                 bench, channel.device, motion.outputs, motion.R_world_body, own, run.R_tracker_mean
             )
+        tau = float(own[parameters.places.lag(channel.device)])
         residual, jacobian, H, D = _channel_rows(bench, run, channel, motion, readings[channel.device], own)
         motion_width = starts + directions.size
         full = np.zeros((*residual.shape, width))
@@ -254,7 +255,9 @@ def linearise_run(
                 np.tile(np.arange(axes), channel.node.size),
                 H.reshape(rows, -1),
                 D.reshape(rows, 6),
-                channel.grouped_variance.ravel(),
+                (
+                    channel.grouped_variance + unsettled(run.grid.step, tau, channel.node, channel.grouped)
+                ).ravel(),
                 np.concatenate([residual.reshape(rows, 1), full.reshape(rows, width)], axis=1),
             )
         )

@@ -228,6 +228,9 @@ def trials(
             far = False
     promises = screen(problem, evaluation, candidates, mass)
     worthy = [p for p in promises if p.gain > needed_gain(p.candidate, len(candidates) + len(SWINGS))]
+    if liar is not None:
+        own = [p for p in worthy if p.candidate.where.get("channel") == liar.device]
+        worthy = own or worthy
     worthy = [p for p in worthy if p.gain > WORTH * worthy[0].gain][:FITTED]
     if far:
         seen = {p.candidate.label for p in worthy}
