@@ -11,6 +11,15 @@ from rig_identification.model.motion import State
 
 
 @dataclass(frozen=True)
+class HeldPart:
+    """A stretch of a recording in which something beside the rig acts on the body."""
+
+    recording: str
+    start: float  # s after the recording's start
+    end: float  # s
+
+
+@dataclass(frozen=True)
 class Fitted:
     """A solved problem and how its held-out runs came out."""
 
@@ -22,3 +31,4 @@ class Fitted:
     holdouts: tuple[Linearised, ...]
     notes: tuple[str, ...] = ()
     guess: Point | None = None  # where the fit started: everything about the rig as described
+    held_parts: tuple[HeldPart, ...] = ()

@@ -13,7 +13,7 @@ from rig_identification.estimate.cautious import solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
-from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, fit_start_growing, misfit, solve_growing
 from rig_identification.estimate.launch import Launch, launch_state
 from rig_identification.estimate.observability import inertial_estimate, invert_information
@@ -21,7 +21,13 @@ from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.scan import scan
-from rig_identification.estimate.segments import free_part, in_pieces, solve_in_pieces
+from rig_identification.estimate.segments import (
+    FreePart,
+    free_part,
+    in_pieces,
+    solve_in_pieces,
+    with_noise_of_swing,
+)
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.whole import fit_whole
@@ -81,6 +87,7 @@ class Start:
     rest: State
     held: tuple[Run, ...]
     notes: tuple[str, ...] = ()
+    held_parts: tuple[HeldPart, ...] = ()
 
 
 def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
@@ -103,28 +110,48 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     progress("looking for the free part of each run", 0.2)
     half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
     _, pieces, _ = solve_in_pieces(half, found.theta, found.rest, (found.rest,) * len(problem.rests))
-    theta, notes = pieces.point.theta, []
-    free: dict[str, Run] = {}
-    for run in (*problem.runs, *held):
-        part = free_part(problem, run, theta, found.rest)
-        free[run.recording.name] = part.run
-        if part.held:
-            notes.append(
-                f"{run.recording.name}: used from {part.start:.1f} to {part.end:.1f} s; before or after that "
-                f"the body does not move freely ({', '.join(f'{a:.1f} to {b:.1f} s' for a, b in part.held)})"
-            )
+    theta = pieces.point.theta
+    parts = {run.recording.name: free_part(problem, run, theta, found.rest) for run in (*problem.runs, *held)}
+    free = {name: with_noise_of_swing(part.run) for name, part in parts.items()}
+    by_hand = tuple(stretch for name, part in parts.items() for stretch in _stretches(name, part))
+    notes = tuple(_note(name, part) for name, part in parts.items() if part.held)
     runs = tuple(free[run.recording.name] for run in problem.runs)
+    problem = replace(problem, runs=runs)
     starts = tuple(launch_state(problem.bench, run, theta, found.rest) for run in runs)
     point = Point(theta, starts, (found.rest,) * len(problem.rests))
     held = tuple(free[run.recording.name] for run in held)
-    return Start(replace(problem, runs=runs), point, found.rest, held, tuple(notes))
+    return Start(problem, point, found.rest, held, notes, by_hand)
+
+
+def _stretches(name: str, part: FreePart) -> list[HeldPart]:
+    """Driven pieces that touch, joined."""
+    out: list[HeldPart] = []
+    for start, end in part.held:
+        if out and start - out[-1].end < 1e-6 + 0.5 * (end - start):
+            out[-1] = replace(out[-1], end=end)
+        else:
+            out.append(HeldPart(name, start, end))
+    return out
+
+
+def _note(name: str, part: FreePart) -> str:
+    where = ", ".join(f"{s.start:.1f} to {s.end:.1f} s" for s in _stretches(name, part))
+    return (
+        f"{name}: used from {part.start:.1f} to {part.end:.1f} s; outside of that something beside the rig "
+        f"moves the body ({where}), a person's hand for one"
+    )
+
+
+def only_watched(problem: Problem) -> bool:
+    """Whether no device measures force or acceleration: the body is only seen to move."""
+    devices = {c.device for run in problem.runs for c in run.channels}
+    forces = devices & set(problem.bench.parameters.places.cables)
+    return bool(problem.runs) and not forces and "imu" not in devices
 
 
 def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
     """The way to a first guess that the session's sensors allow."""
-    devices = {c.device for run in problem.runs for c in run.channels}
-    forces = devices & set(problem.bench.parameters.places.cables)
-    if problem.runs and not forces and "imu" not in devices:
+    if only_watched(problem):
         watched = _watched_start(problem, held, progress)
         if watched is not None:
             return watched
@@ -157,6 +184,7 @@ def fit_session(session: Session, progress: Progress = _silent) -> Fitted:
         tuple(linearised for _, linearised in outcomes),
         start.notes,
         start.point,
+        start.held_parts,
     )
 
 

@@ -124,13 +124,13 @@ def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
 LOCAL = 0.06
 
 
-def sample_noise_std(time: Array, values: Array) -> Array:
-    """(w,) standard deviation of what a local cubic does not follow in samples (n, w).
+def sample_noise_std(time: Array, values: Array, local: float = LOCAL) -> Array:
+    """(w,) standard deviation of what a cubic over ``local`` seconds does not follow in samples (n, w).
 
     Not the white part alone: a tracker's jumps and bursts count, as they do in a fit.
     """
     rate = (time.size - 1) / max(float(time[-1] - time[0]), 1e-9)
-    window = max(7, 2 * int(0.5 * LOCAL * rate) + 1)
+    window = max(7, 2 * int(0.5 * local * rate) + 1)
     if time.size < 2 * window:
         return np.asarray(np.std(values, axis=0) + 1e-12)
     rest = values - savgol_filter(values, window, 3, axis=0)

@@ -41,43 +41,55 @@ class Scanned:
     rest: State
 
 
-def _candidates(problem: Problem, piece: Run, whole: Run):  # type: ignore[no-untyped-def]
-    """Yield (bench, theta, rest, start) over headings, depths and sizes."""
+def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], depths, sizes):  # type: ignore[no-untyped-def]
+    """Yield (bench, theta, rest, start, heading) over headings, depths and sizes."""
     parameters, rig = problem.bench.parameters, problem.bench.rig
     first = parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))
     size = float(np.max(extent(rig)))
     seen = whole.R_tracker_mean is not None
-    for heading in headings(rig, whole) if seen else [0.0]:
-        for depth in DEPTHS:
+    for heading in headings_:
+        for depth in depths:
             elements = first.copy()
             elements[3] = np.mean([c.body_point[2] for c in rig.cables]) - depth * size
             rest = rest_of(model_at(parameters, parameters.start(elements)))
             bench: Bench = problem.bench
             if seen:
                 bench = replace(bench, mocap=mocap_mount(rig, whole, rest, heading))
-            for scale in SIZES:
+            for scale in sizes:
                 elements[4:] = scale * first[4:]
                 theta = parameters.start(elements)
                 start = None
                 if bench.mocap is not None:
                     model = model_at(parameters, theta)
                     start = start_from_mocap(model, piece, bench.mocap, np.zeros(MOCAP_SIZE))
-                yield bench, theta, rest, rest if start is None else start
+                yield bench, theta, rest, rest if start is None else start, heading
+
+
+def _best(piece: Run, tried):  # type: ignore[no-untyped-def]
+    """The one of (bench, theta, rest, start, heading) that fits best, with its own best start."""
+    best, kept = np.inf, None
+    for bench, theta, rest, start, heading in tried:
+        found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
+        if found is not None and found[0].cost < best:
+            best, kept = found[0].cost, (bench, theta, rest, found[1], heading)
+    return kept
 
 
 def scan(problem: Problem, run: Run) -> Scanned | None:
-    """Scan a run of ``problem``; None where no candidate can be followed."""
+    """Scan a run of ``problem``: headings at every other size first, then depths and sizes at the best one.
+
+    None where no candidate can be followed.
+    """
     nodes = run.grid.nodes
     half = run.between(nodes // 2, nodes - 1)
     piece = half.until(SCANNED)
-    best, kept = np.inf, None
-    for bench, theta, rest, start in _candidates(problem, piece, half):
-        found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
-        if found is not None and found[0].cost < best:
-            best, kept = found[0].cost, (bench, theta, rest, found[1])
+    all_headings = headings(problem.bench.rig, half) if half.R_tracker_mean is not None else [0.0]
+    kept = _best(piece, _tried(problem, half, piece, all_headings, DEPTHS[1:2], SIZES[::2]))
+    if kept is not None:
+        kept = _best(piece, _tried(problem, half, piece, [kept[4]], DEPTHS, SIZES))
     if kept is None:
         return None
-    bench, theta, rest, start = kept
+    bench, theta, rest, start, _ = kept
     settled = replace(problem, bench=bench, runs=(run,), weak_center=theta[:INERTIAL].copy())
     brief = replace(settled, runs=(piece,), rests=(), weak=NEAR * problem.weak)
     evaluation, _ = solve(brief, Point(theta, (start,), ()), iterations=25, tolerance=0.5)

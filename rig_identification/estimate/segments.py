@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.sampling import LOCAL, sample_noise_std
 from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, solve
 from rig_identification.model.motion import State
 
@@ -101,3 +102,35 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
         if bad
     )
     return FreePart(run.between(a, b), first.offset, last.offset + last.grid.duration, held)
+
+
+def with_noise_of_swing(run: Run) -> Run:
+    """The run with each noise that was estimated as large as a smooth swing shows it.
+
+    Neighbouring samples show a tracker's white noise alone. What wanders with the pose (markers
+    hidden and found again, lens errors) is noise as well: all that a cubic over a quarter of
+    the swing's period does not follow.
+    """
+    period = _period(run)
+    return replace(
+        run,
+        channels=tuple(
+            replace(c, noise=np.maximum(c.noise, sample_noise_std(c.time, c.values, 0.25 * period)))
+            if c.noise_estimated
+            else c
+            for c in run.channels
+        ),
+    )
+
+
+def _period(run: Run) -> float:
+    """Period (s) of the strongest line, each axis in units of its noise."""
+    best, period = 0.0, LOCAL
+    for c in run.channels:
+        step = (c.time[-1] - c.time[0]) / max(c.time.size - 1, 1)
+        centred = (c.values - np.mean(c.values, axis=0)) / c.noise
+        power = np.abs(np.fft.rfft(centred * np.hanning(c.time.size)[:, None], axis=0))
+        line = int(np.argmax(np.max(power[1:], axis=1))) + 1
+        if np.max(power[line]) > best:
+            best, period = float(np.max(power[line])), step * c.time.size / line
+    return max(period, LOCAL)

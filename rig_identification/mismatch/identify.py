@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig_identification.estimate.identify import compose, fit_ideal, scores
+from rig_identification.estimate.identify import compose, fit_ideal, only_watched, scores
 from rig_identification.mismatch.explain import explain
+from rig_identification.mismatch.watched import explain_watched
 from rig_identification.recording import Session
 from rig_identification.result import Identification
 
@@ -32,6 +33,15 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
 
     ideal = fit_ideal(session, lambda stage, fraction: notify(stage, IDEAL_SHARE * fraction))
     plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+    if only_watched(ideal.fitted.problem) and ideal.pieces is not None:
+        watched = explain_watched(
+            ideal, lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
+        )
+        if watched is not None:
+            answer = compose(
+                session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful
+            )
+            return replace(answer, figures={**answer.figures, "ideal": plain})
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:

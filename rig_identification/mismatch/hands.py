@@ -1,0 +1,75 @@
+"""The part of a watched run in which a person holds or drives the body."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from rig_identification.estimate.evidence import Run, prepare
+from rig_identification.estimate.identify import Fitted
+from rig_identification.recording import Recording
+from rig_identification.result import Finding
+
+Array = NDArray[np.float64]
+
+#: Window over which acceleration is read off the recorded path, s.
+WINDOW = 0.5
+
+
+def _pull(run: Run, gravity: float, length: float) -> tuple[Array, Array] | None:
+    """(time (n,), acceleration (n, 2) m/s^2) that gravity on cables of ``length`` does not account for."""
+    place = next((c for c in run.channels if c.device == "mocap" and c.quantity == "position"), None)
+    if place is None:
+        return None
+    step = float(np.median(np.diff(place.time)))
+    window = max(5, 2 * int(0.5 * WINDOW / step) + 1)
+    if place.time.size < window:
+        return None
+    even = np.arange(place.time[0], place.time[-1], step)
+    path = np.stack([np.interp(even, place.time, v) for v in place.values.T[:2]], axis=1)
+    acceleration = savgol_filter(path, window, 3, deriv=2, delta=step, axis=0)
+    calm = savgol_filter(path, window, 3, axis=0)
+    return even, acceleration + gravity / length * (calm - np.mean(calm, axis=0))
+
+
+def hand_finding(fitted: Fitted) -> Finding | None:
+    """Finding ``external_force`` for the parts that were cut off; None where there are none.
+
+    The force is what the marker's path asks of a pendulum of the cables' length beyond gravity; its
+    std is what the same measure reads in the free part, where no one pushes.
+    """
+    if not fitted.held_parts:
+        return None
+    rig, elements = fitted.problem.bench.rig, fitted.problem.bench.parameters
+    mass = float(elements.elements(fitted.evaluation.point.theta)[0])
+    length = float(np.mean([c.length for c in rig.cables]))
+    peak, calm = 0.0, []
+    recordings: dict[str, Recording] = {
+        r.recording.name: r.recording for r in (*fitted.problem.runs, *fitted.holdout_runs)
+    }
+    for name, recording in recordings.items():
+        found = _pull(prepare(rig, recording), rig.gravity, length)
+        if found is None:
+            continue
+        time, missing = found
+        force = mass * np.hypot(missing[:, 0], missing[:, 1])
+        held = np.zeros(time.size, dtype=bool)
+        mine = [part for part in fitted.held_parts if part.recording == name]
+        for part in mine:
+            held |= (time >= part.start) & (time <= part.end)
+        if np.any(held):
+            peak = max(peak, float(np.max(force[held])))
+            free = time > max(part.end for part in mine)
+            calm.append(force[free])
+    level = float(np.sqrt(np.mean(np.concatenate(calm) ** 2))) if calm else peak
+    times = [{"recording": p.recording, "start": p.start, "end": p.end} for p in fitted.held_parts]
+    told = "; ".join(f"{p.recording} {p.start:.1f} to {p.end:.1f} s" for p in fitted.held_parts)
+    return Finding(
+        "external_force",
+        {"channel": None, "axis": None, "times": times},
+        {"peak_force": {"value": peak, "std": level, "unit": "N"}},
+        {"log_likelihood_gain": None, "holdout_error_before": None, "holdout_error_after": None},
+        f"A person's hand or another outside force drives the body ({told}), with up to {peak:.2g} N. "
+        "These parts were left out; let go before the recording that counts.",
+    )

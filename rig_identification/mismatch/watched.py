@@ -1,0 +1,204 @@
+"""What takes the energy out of a body that is only watched to swing.
+
+Motion capture alone sees no force: of all that the ideal model may lack it tells apart what changes
+how a swing dies away. The few effects that do are fitted to pieces of several periods, with every
+channel weighed by what its residual really has, the likeliest are added one by one, and the whole
+runs are then fitted with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from rig_identification.estimate.cautious import reweighted, solve_cautiously
+from rig_identification.estimate.growing import fit_start_growing, settled_starts
+from rig_identification.estimate.identify import ORDINARY, Fitted, Ideal, parameter_estimates, scores
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.segments import PIECE, pieces
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.verdict import judge
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.hands import hand_finding
+from rig_identification.mismatch.left_out_physics import left_out_physics
+from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.search import Trial, finished, log_evidence, mass_of, needed_gain
+from rig_identification.result import Finding, Mismatch
+
+Notify = Callable[[str, float], None]
+
+#: Effects that change how a swing dies away.
+DAMPERS = ("hinge_damping", "hinge_friction", "air_drag")
+#: Length of the pieces, s: friction shows against the amplitude, which must change within one.
+LONG_PIECE = 2.0 * PIECE
+#: Steps of the fit of one hypothesis, and of the whole runs.
+STEPS = 8
+WHOLE_STEPS = 20
+#: Where a hypothesis starts, in units of its prior's std.
+FIRST_VALUE = 0.02
+
+
+@dataclass(frozen=True)
+class Watched:
+    """The whole runs with what damps them, and the cautious fit of the body with that."""
+
+    fitted: Fitted
+    mismatch: Mismatch
+    careful: tuple[Problem, Evaluation]
+
+
+def _in_long_pieces(problem: Problem, ideal: Fitted, theta) -> tuple[Problem, Point]:  # type: ignore[no-untyped-def]
+    cut = tuple(piece for run in problem.runs for piece in pieces(run, LONG_PIECE))
+    parts = replace(problem, runs=cut)
+    starts = tuple(launch_state(problem.bench, piece, theta, ideal.rest) for piece in cut)
+    return parts, Point(theta, starts, ideal.evaluation.point.rest_guesses)
+
+
+def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Trial | None:
+    wide = extended(problem, (candidate,))
+    point = carried(wide, problem, evaluation.point)
+    theta = point.theta.copy()
+    theta[wide.bench.parameters.index_of(candidate.parameters[0].name)] = FIRST_VALUE
+    try:
+        fitted, _ = solve(wide, replace(point, theta=theta), iterations=STEPS, tolerance=0.5)
+    except FloatingPointError:
+        return None
+    return finished(Trial(candidate, wide, fitted, log_evidence(fitted), True))
+
+
+def _damped(
+    problem: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
+) -> tuple[list[Trial], list[dict[str, object]], Evaluation]:
+    """Effects added one by one while each gains more than chance, rivals of the first, and the fit."""
+    found: list[Trial] = []
+    rivals: list[dict[str, object]] = []
+    left = list(candidates)
+    while left:
+        base = log_evidence(evaluation)
+        tried = []
+        for candidate in left:
+            notify(f"search: {candidate.label}", 0.2 + 0.2 * len(found))
+            trial = _trial(problem, evaluation, candidate)
+            if trial is not None:
+                tried.append(trial)
+        tried = [t for t in tried if t.evidence - base > needed_gain(t.candidate, len(candidates))]
+        if not tried:
+            break
+        tried.sort(key=lambda t: -t.evidence)
+        best = tried[0]
+        if not found:
+            rivals = [
+                {
+                    "effect": t.candidate.effect,
+                    "where": dict(t.candidate.where),
+                    "log_likelihood_gap": float(best.evidence - t.evidence),
+                }
+                for t in tried[1:]
+            ]
+        found.append(best)
+        problem, evaluation = best.problem, best.evaluation
+        left = [c for c in left if c.label != best.candidate.label]
+    return found, rivals, evaluation
+
+
+def _whole(ideal: Fitted, found: list[Trial], weights: Problem, evaluation: Evaluation) -> Fitted:
+    """Whole runs fitted with the effects, weighed as in ``weights``, then scored with the sensors' noise."""
+    last = found[-1]
+    wide = replace(ideal.problem, bench=last.problem.bench, weak_center=last.problem.weak_center)
+    noise = {(c.device, c.quantity): c.noise for run in weights.runs for c in run.channels}
+    runs = tuple(
+        replace(run, channels=tuple(replace(c, noise=noise[c.device, c.quantity]) for c in run.channels))
+        for run in wide.runs
+    )
+    heavy = replace(wide, runs=runs)
+    theta = evaluation.point.theta
+    starts = tuple(launch_state(wide.bench, run, theta, ideal.rest) for run in runs)
+    point = Point(theta, starts, evaluation.point.rest_guesses)
+    point = replace(point, starts=settled_starts(heavy, point))
+    fitted, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
+    scored = evaluate(wide, fitted.point)
+    if scored is None:
+        raise FloatingPointError("the fitted motion cannot be followed")
+    held_runs, held = [], []
+    for run in ideal.holdout_runs:
+        state = launch_state(wide.bench, run, fitted.point.theta, ideal.rest)
+        result = fit_start_growing(wide.bench, run, fitted.point.theta, state)
+        if result is not None:
+            held_runs.append(run)
+            held.append(result[0])
+    return replace(
+        ideal,
+        problem=wide,
+        evaluation=scored,
+        converged=converged,
+        holdout_runs=tuple(held_runs),
+        holdouts=tuple(held),
+    )
+
+
+def _finding(
+    trial: Trial, fitted: Fitted, stds_of: Evaluation, gain: float, errors: tuple[float | None, float | None]
+) -> Finding:
+    values = {p.name: p.value for p in parameter_estimates(fitted.problem, fitted.evaluation)}
+    stds = {p.name: p.std for p in parameter_estimates(fitted.problem, stds_of)}
+    told = trial.candidate.told(values, stds)
+    value, std, unit = next(iter(told.values()))
+    sentence = trial.candidate.sentence.format(value=f"{value:.3g} ± {std:.2g} {unit}", channel=None)
+    return Finding(
+        trial.candidate.effect,
+        dict(trial.candidate.where),
+        {name: {"value": float(v), "std": float(s), "unit": u} for name, (v, s, u) in told.items()},
+        {
+            "log_likelihood_gain": float(gain),
+            "holdout_error_before": errors[0],
+            "holdout_error_after": errors[1],
+        },
+        f"{sentence} {trial.candidate.advice}",
+    )
+
+
+def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
+    """Find what damps a watched body; None where nothing does."""
+    ideal = found_ideal.fitted
+    if found_ideal.pieces is None:
+        return None
+    notify("fitting in pieces", 0.05)
+    start = found_ideal.pieces[1].theta
+    parts, point = _in_long_pieces(ideal.problem, ideal, start)
+    evaluation, _ = solve(parts, point, iterations=STEPS, tolerance=0.5)
+    parts = reweighted(parts, evaluation)
+    again = evaluate(parts, evaluation.point)
+    evaluation = evaluation if again is None else again
+    rig, parameters = ideal.problem.bench.rig, ideal.problem.bench.parameters
+    every = left_out_physics(rig, parameters, mass_of(parts, evaluation))
+    candidates = [c for c in every if c.effect in DAMPERS]
+    found, rivals, damped = _damped(parts, evaluation, candidates, notify)
+    if not found:
+        return None
+    notify("weighing each channel by its residual", 0.75)
+    careful = solve_cautiously(found[-1].problem, damped)
+    notify("search: whole runs", 0.85)
+    fitted = _whole(ideal, found, careful[0], careful[1])
+    before, after = scores(ideal), scores(fitted)
+    verdict = judge(
+        fitted,
+        parameter_estimates(fitted.problem, fitted.evaluation),
+        after.holdout,
+        after.training,
+        ORDINARY,
+    )
+    errors = (before.holdout, after.holdout)
+    gain = ideal.evaluation.cost - fitted.evaluation.cost
+    findings = [_finding(t, fitted, careful[1], gain, errors) for t in found]
+    hand = hand_finding(ideal)
+    if hand is not None:
+        findings.append(hand)
+    named = ", ".join(f.effect for f in findings)
+    if verdict.verdict == "none":
+        mismatch = Mismatch(
+            "explained", f"With {named} in the model every residual is noise.", tuple(findings), tuple(rivals)
+        )
+    else:
+        text = f"{named} explains part of it; something is left. {verdict.explanation}"
+        mismatch = Mismatch("unexplained", text, tuple(findings), tuple(rivals))
+    return Watched(fitted, mismatch, careful)
