@@ -9,18 +9,22 @@ that no mass is negative.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
 
 #: Share of the belief's standard deviation above which an element counts as not determined.
 GAIN = 1.0 / 3.0
+#: Factor on the noise of a channel that testifies for nothing.
+SILENT = 1e3
 
 
 def elements_covariance(problem: Problem, evaluation: Evaluation) -> Array:
@@ -65,10 +69,70 @@ def data_information(problem: Problem, evaluation: Evaluation) -> Array:
 def inertial_estimate(problem: Problem, evaluation: Evaluation) -> InertialEstimate:
     """The ten numbers with their covariance and the names of those that stay undetermined."""
     theta = evaluation.point.theta
+    left = share_left(problem, evaluation)
+    lost = tuple(name for name, share in zip(ELEMENTS, left, strict=True) if not share < GAIN)
+    covariance = elements_covariance(problem, evaluation)
+    return InertialEstimate(problem.bench.parameters.elements(theta), covariance, lost)
+
+
+def believed_point(problem: Problem, evaluation: Evaluation) -> Array:
+    """The vector with a body of the weak prior's shape, as large about the vertical and as heavy as fitted.
+
+    A fit that lacks something may end at a body thin to nothing, where a little inertia
+    changes the motion without limit: information there is of the corner, not of the body.
+    """
+    parameters = problem.bench.parameters
+    theta: Array = evaluation.point.theta.copy()
+    fitted = parameters.elements(theta)
+    shape = parameters.elements(np.concatenate([problem.weak_center, theta[INERTIAL:]]))
+    shape[4:] *= fitted[9] / shape[9]
+    shape[0] = fitted[0]
+    theta[:INERTIAL] = parameters.start(shape)[:INERTIAL]
+    return theta
+
+
+def share_left(problem: Problem, evaluation: Evaluation) -> Array:
+    """(10,) std of each element as a share of the belief's, belief and recordings together."""
     belief = believed_std(problem)
     scaled = data_information(problem, evaluation) * np.outer(belief, belief)
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    left = (vectors**2) @ (1.0 / (np.maximum(values, 0.0) + 1.0))
-    lost = tuple(name for name, share in zip(ELEMENTS, left, strict=True) if not np.sqrt(share) < GAIN)
-    covariance = elements_covariance(problem, evaluation)
-    return InertialEstimate(problem.bench.parameters.elements(theta), covariance, lost)
+    return np.asarray(np.sqrt((vectors**2) @ (1.0 / (np.maximum(values, 0.0) + 1.0))))
+
+
+def testimony(
+    problem: Problem, evaluation: Evaluation, predicted: dict[tuple[str, str, int], float]
+) -> tuple[str, ...]:
+    """Elements that channels which the model does not predict would have to tell, or none tells.
+
+    predicted: (device, quantity, axis) -> residual of a run predicted without a fit as a share of
+    its signal. A channel missed by more than ``GAIN`` of its motion testifies for nothing.
+    """
+    runs = []
+    for run in problem.runs:
+        channels = []
+        for c in run.channels:
+            mute = [predicted.get((c.device, c.quantity, a), 0.0) > GAIN for a in range(c.width)]
+            channels.append(replace(c, noise=np.where(mute, SILENT, 1.0) * c.noise))
+        runs.append(replace(run, channels=tuple(channels)))
+    heard = replace(problem, runs=tuple(runs))
+    lost: set[str] = set()
+    for theta in (evaluation.point.theta, believed_point(problem, evaluation)):
+        there = evaluate(heard, replace(evaluation.point, theta=theta))
+        if there is not None:
+            std = share_left(heard, there) * believed_std(heard)
+            size = natural_size(problem.bench.parameters.elements(theta))
+            lost |= {name for name, s in zip(ELEMENTS, std / size, strict=True) if not s < GAIN}
+    # A product of inertia counts against the moments about its two axes: without them it tells nothing
+    lost |= {name for name in ELEMENTS if name[0] == "J" and {f"J{a}{a}" for a in name[1:]} & lost}
+    return tuple(name for name in ELEMENTS if name in lost)
+
+
+def natural_size(elements: Array) -> Array:
+    """(10,) what an error of each element is to be held against.
+
+    The mass, the largest radius of gyration, each moment, and sqrt(Jii Jjj) for the products.
+    """
+    mass, (xx, yy, zz) = elements[0], elements[[4, 7, 9]]
+    moments = np.sqrt([xx * xx, xx * yy, xx * zz, yy * yy, yy * zz, zz * zz])
+    radius = np.sqrt(max(xx, yy, zz) / mass)
+    return np.concatenate([[mass], np.full(3, radius), moments])

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.identify import compose, fit_ideal, only_watched, scores
+from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.watched import explain_watched
 from rig_identification.recording import Session
-from rig_identification.result import Identification
+from rig_identification.result import ELEMENTS, Identification
 
 Progress = Callable[[str, float], None]
 
@@ -41,6 +42,11 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
             answer = compose(
                 session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful
             )
+            lost = {*answer.total.unobservable, *watched.unobservable}
+            total = replace(answer.total, unobservable=tuple(name for name in ELEMENTS if name in lost))
+            answer = replace(answer, total=total)
+            if session.rig.frame is not None:
+                answer = replace(answer, without_frame=subtract_frame(total, session.rig.frame))
             return replace(answer, figures={**answer.figures, "ideal": plain})
     found, note = None, None
     if ideal.fitted.problem.runs:

@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rig_identification.estimate.cautious import reweighted, solve_cautiously
 from rig_identification.estimate.growing import fit_start_growing, settled_starts
-from rig_identification.estimate.identify import ORDINARY, Fitted, Ideal, parameter_estimates, scores
+from rig_identification.estimate.identify import ORDINARY, Fitted, Ideal, Scores, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import PIECE, pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.verdict import judge
@@ -45,6 +48,7 @@ class Watched:
     fitted: Fitted
     mismatch: Mismatch
     careful: tuple[Problem, Evaluation]
+    unobservable: tuple[str, ...]  # beyond what the information matrix alone names
 
 
 def _in_long_pieces(problem: Problem, ideal: Fitted, theta) -> tuple[Problem, Point]:  # type: ignore[no-untyped-def]
@@ -201,4 +205,16 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     else:
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
         mismatch = Mismatch("unexplained", text, tuple(findings), tuple(rivals))
-    return Watched(fitted, mismatch, careful)
+    return Watched(fitted, mismatch, careful, testimony(*careful, _missed(fitted, after)))
+
+
+def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:
+    """(device, quantity, axis) -> residual as a share of the signal, held out where a run is."""
+    held = {run.recording.name for run in fitted.holdout_runs}
+    out: dict[tuple[str, str, int], float] = {}
+    for c in found.channels:
+        if c.recording in held or not held:
+            share = float(np.std(c.measured - c.predicted) / max(float(np.std(c.measured)), 1e-12))
+            key = (c.channel, c.quantity, 0 if c.axis is None else "xyz".index(c.axis))
+            out[key] = max(out.get(key, 0.0), share)
+    return out

@@ -1,0 +1,163 @@
+"""Bifilar pendulums that only motion capture watches: real ones where this machine has them, and simulated."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+from scipy.spatial.transform import Rotation
+
+from rig_identification.mismatch.identify import identify
+from rig_identification.recording import Recording, Session
+from rig_identification.result import ELEMENTS, Identification
+from rig_identification.rig import DEFAULT_TOLERANCE, Cable, Rig
+from rig_identification.session import read_session
+from rig_identification.simulate import Posed, RunSpec, SampleRates, SessionSpec, simulate_session
+
+FOLDER = Path(
+    os.environ.get(
+        "RIG_IDENTIFICATION_RECORDINGS", Path(__file__).resolve().parents[2] / "shared" / "recordings"
+    )
+)
+
+#: s of wall clock that a recorded session may take.
+LONGEST = 120.0
+
+
+@dataclass(frozen=True)
+class Answered:
+    session: Session
+    answer: Identification
+    seconds: float
+
+
+def answered(name: str) -> Answered:
+    folder = FOLDER / name
+    if not (folder / "session.yaml").exists():
+        pytest.skip(f"no {folder}: set RIG_IDENTIFICATION_RECORDINGS to a folder of sessions")
+    session = read_session(folder)
+    begin = time.monotonic()
+    answer = identify(session)
+    return Answered(session, answer, time.monotonic() - begin)
+
+
+@pytest.fixture(scope="module")
+def cradle() -> Answered:
+    """An empty cradle that a person sets turning about the vertical."""
+    return answered("pendulum_cradle_z")
+
+
+def yaw_period(recording: Recording) -> float:
+    """Period (s) of the yaw from its largest swing on: zero crossings, a straight line through them."""
+    assert recording.mocap is not None
+    turns = Rotation.from_quat(recording.mocap.values[:, 3:])
+    t = recording.mocap.time
+    # In the tracker's axes, whose z is up
+    yaw = (turns * turns.mean().inv()).as_rotvec()[:, 2]
+    free = t > t[int(np.argmax(np.abs(yaw)))]
+    t, yaw = t[free], yaw[free]
+    smooth = np.convolve(yaw - np.mean(yaw), np.ones(31) / 31.0, mode="same")
+    rising = np.flatnonzero((smooth[:-1] < 0.0) & (smooth[1:] >= 0.0))
+    crossing = t[rising] - smooth[rising] * (t[rising + 1] - t[rising]) / (
+        smooth[rising + 1] - smooth[rising]
+    )
+    # Bursts of noise cross more than once: one crossing a swing
+    crossing = crossing[np.concatenate([[True], np.diff(crossing) > 1.0])]
+    assert crossing.size > 6
+    (period, _), _ = curve_fit(lambda n, a, b: a * n + b, np.arange(crossing.size), crossing)
+    return float(period)
+
+
+def bifilar_inertia(rig: Rig, period: float) -> float:
+    """J = m g D^2 / (4 h w^2)."""
+    assert rig.mass is not None
+    first, second = rig.cables
+    distance = float(np.linalg.norm(first.body_point - second.body_point))
+    rate = 2.0 * np.pi / period
+    return rig.mass * rig.gravity * distance**2 / (4.0 * first.length * rate**2)
+
+
+def element(answer: Identification, name: str) -> float:
+    return float(answer.total.values[ELEMENTS.index(name)])
+
+
+def test_vertical_inertia_agrees_with_the_bifilar_formula(cradle: Answered) -> None:
+    period = float(np.mean([yaw_period(r) for r in cradle.session.recordings]))
+    expected = bifilar_inertia(cradle.session.rig, period)
+    assert element(cradle.answer, "Jzz") == pytest.approx(expected, rel=0.03)
+    assert "Jzz" not in cradle.answer.total.unobservable
+    assert "m" not in cradle.answer.total.unobservable
+
+
+def test_what_a_bifilar_pendulum_cannot_tell_is_named(cradle: Answered) -> None:
+    assert {"Jxx", "Jxy", "Jxz", "Jyy", "Jyz"} <= set(cradle.answer.total.unobservable)
+
+
+def test_the_part_in_which_a_person_drives_is_found(cradle: Answered) -> None:
+    """By eye the body is let go between 13 and 15 s in run_1, and between 11 and 13 s in run_2."""
+    hand = next(f for f in cradle.answer.mismatch.findings if f.effect == "external_force")
+    ends: dict[str, float] = {}
+    for stretch in hand.where["times"]:  # type: ignore[attr-defined]
+        ends[stretch["recording"]] = max(ends.get(stretch["recording"], 0.0), stretch["end"])
+    assert 12.5 <= ends["run_1"] <= 16.5
+    assert 10.5 <= ends["run_2"] <= 14.5
+    assert hand.parameters["peak_force"]["value"] > 0.0  # type: ignore[operator]
+
+
+def test_what_damps_it_is_found(cradle: Answered) -> None:
+    damping = next(f for f in cradle.answer.mismatch.findings if f.effect == "hinge_damping")
+    value, std = damping.parameters["damping"]["value"], damping.parameters["damping"]["std"]
+    # Yaw loses 3 % of its amplitude a second: energy c w^2 (two cables, four hinges at half the twist)
+    assert value == pytest.approx(2.0 * 0.03 * element(cradle.answer, "Jzz"), rel=0.3)  # type: ignore[call-overload]
+    assert 0.0 < std < 0.5 * value  # type: ignore[operator]
+    before, after = damping.evidence["holdout_error_before"], damping.evidence["holdout_error_after"]
+    assert before is not None
+    assert after is not None
+    assert after < 0.75 * before
+
+
+def test_it_takes_no_longer_than_a_person_waits(cradle: Answered) -> None:
+    assert cradle.seconds <= LONGEST
+
+
+def pendulum(length: float = 1.5, apart: float = 0.5) -> Rig:
+    cables = tuple(
+        Cable(f"cable_{i + 1}", np.array([x, 0.0, 0.0]), np.array([x, 0.0, 0.0]), length)
+        for i, x in enumerate((-0.5 * apart, 0.5 * apart))
+    )
+    noise = {"mocap_position": 3e-4, "mocap_orientation": 1e-3}
+    return Rig(9.80665, cables, 1.1, 0.002, noise=noise, tolerance=dict(DEFAULT_TOLERANCE))
+
+
+@pytest.fixture(scope="module")
+def simulated() -> tuple[Identification, np.ndarray]:
+    """Turned by 0.3 rad and let go, nothing concealed."""
+    elements = np.array([1.1, 0.01, 0.0, -0.08, 0.05, 0.0, 0.0, 0.04, 0.0, 0.075])
+    turned = Posed(np.array([0.01, 0.02, -1.49]), Rotation.from_rotvec([0.0, 0.0, 0.3]).as_quat())
+    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0)
+    runs = (RunSpec("run_1", 20.0, turned), RunSpec("run_2", 12.0, turned, holdout=True))
+    session, truth = simulate_session(
+        SessionSpec("bifilar", pendulum(), elements, runs, rates=rates), np.random.default_rng(3)
+    )
+    return identify(session), truth.elements
+
+
+def test_simulated_pendulum_gives_its_vertical_inertia(simulated: tuple[Identification, np.ndarray]) -> None:
+    answer, truth = simulated
+    zz = ELEMENTS.index("Jzz")
+    std = float(np.sqrt(answer.total.covariance[zz, zz]))
+    assert "Jzz" not in answer.total.unobservable
+    assert abs(answer.total.values[zz] - truth[zz]) <= 3.0 * std
+    assert element(answer, "Jzz") == pytest.approx(truth[zz], rel=0.03)
+
+
+def test_simulated_pendulum_hides_what_it_must(simulated: tuple[Identification, np.ndarray]) -> None:
+    """The cables lock the turn across their plane: the moment about it never shows."""
+    answer, _ = simulated
+    assert "Jyy" in answer.total.unobservable
+    assert answer.mismatch.findings == ()
