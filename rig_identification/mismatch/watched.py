@@ -164,10 +164,10 @@ def _finding(
 def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     """Find what damps a watched body; None where nothing does."""
     ideal = found_ideal.fitted
-    if found_ideal.pieces is None:
+    if found_ideal.careful is None:
         return None
     notify("fitting in pieces", 0.05)
-    start = found_ideal.pieces[1].theta
+    start = found_ideal.careful[1].point.theta
     parts, point = _in_long_pieces(ideal.problem, ideal, start)
     evaluation, _ = solve(parts, point, iterations=STEPS, tolerance=0.5)
     parts = reweighted(parts, evaluation)
@@ -180,7 +180,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     if not found:
         return None
     notify("weighing each channel by its residual", 0.75)
-    careful = solve_cautiously(found[-1].problem, damped)
+    careful = solve_cautiously(found[-1].problem, damped.point)
     notify("search: whole runs", 0.85)
     fitted = _whole(ideal, found, careful[0], careful[1])
     before, after = scores(ideal), scores(fitted)
