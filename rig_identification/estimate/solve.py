@@ -240,9 +240,6 @@ HOPELESS = 100.0
 #: Share of what noise does not account for below which a step's gain is not worth taking: a model
 #: that lacks something has no optimum worth polishing.
 POLISH = 3e-3
-#: Gain (nats) that may be left of a step at the end of a fit that ran out of iterations: it is then within
-#: 0.6 of its own standard deviation from the optimum, along a direction that hardly shows.
-SETTLED = 0.2
 
 
 def excess(evaluation: Evaluation) -> float:
@@ -300,8 +297,7 @@ def solve(
                 return current, False
         if notify is not None:
             notify(iteration, current.cost)
-    left = 0.5 * float(_bounded_step(problem, current, 1e-6) @ current.gradient)
-    return current, left < SETTLED and not on_plateau(current)
+    return current, False
 
 
 def fit_start(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from rig_identification.estimate.evidence import Run, prepare
-from rig_identification.estimate.identify import Fitted
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.recording import Recording
 from rig_identification.result import Finding
 
