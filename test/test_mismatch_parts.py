@@ -1,0 +1,134 @@
+"""Parts of the mismatch search against closed solutions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from test_estimate_prediction import short  # noqa: F401
+from test_model_internal import with_rest
+from test_model_rigs import thesis_case_14
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.prediction import linearise_run
+from rig_identification.estimate.solve import Problem
+from rig_identification.mismatch.latent import MissingWrench, joined, strongest_push
+from rig_identification.mismatch.law import law_of
+from rig_identification.mismatch.response import whitened_response
+from rig_identification.mismatch.riders import DAMPING, FREQUENCIES, travels
+from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, largest_compliance
+from rig_identification.model import layout
+from rig_identification.model.effects import place
+from rig_identification.model.motion import State
+
+Array = NDArray[np.float64]
+
+
+def swinging(force: Array, states: Array) -> MissingWrench:
+    """A missing force (N, 3) through the datum of a body that does not turn."""
+    nodes = states.shape[0]
+    wrench = np.concatenate([force, np.zeros((nodes, 3))], axis=1)
+    return MissingWrench("run_1", 0.01 * np.arange(nodes), wrench, np.tile(np.eye(3), (nodes, 1, 1)), states)
+
+
+def motion(nodes: int = 2000) -> Array:
+    """A swing along x and y at two frequencies, with its velocity."""
+    t = 0.01 * np.arange(nodes)
+    states = np.zeros((nodes, 12))
+    for i, (size, omega) in enumerate(((0.3, 2.4), (0.2, 3.1))):
+        states[:, i] = size * np.sin(omega * t + i)
+        states[:, 6 + i] = size * omega * np.cos(omega * t + i)
+    return states
+
+
+def test_a_hardening_spring_is_told_as_the_cube_of_displacement() -> None:
+    states, rng = motion(), np.random.default_rng(1)
+    force = 0.2 * rng.standard_normal((2000, 3))
+    force[:, 1] -= 4000.0 * states[:, 1] ** 3
+    law = law_of(swinging(force, states))
+    assert law is not None
+    assert law.component == "force along y"
+    assert law.terms[0] == "the cube of displacement along y"
+    assert law.share > 0.9
+
+
+def test_noise_follows_no_law() -> None:
+    rng = np.random.default_rng(2)
+    assert law_of(swinging(rng.standard_normal((2000, 3)), motion())) is None
+
+
+def test_a_push_is_found_with_its_force_time_and_line() -> None:
+    states, rng = motion(), np.random.default_rng(3)
+    t = 0.01 * np.arange(2000)
+    inside = (t > 8.0) & (t < 9.0)
+    size = np.where(inside, 120.0 * np.sin(np.pi * (t - 8.0)), 0.0)
+    missing = swinging(np.outer(size, [0.0, 1.0, 0.0]) + 0.5 * rng.standard_normal((2000, 3)), states)
+    at = np.array([0.7, 0.1, -0.4])
+    wrench = missing.wrench.copy()
+    wrench[:, 3:] = np.cross(at, wrench[:, :3])
+    push = strongest_push(replace(missing, wrench=wrench), np.array([0.5, 0.1, -0.5]))
+    assert push.size == pytest.approx(120.0, abs=3.0)
+    assert push.start == pytest.approx(8.05, abs=0.06)
+    assert push.end == pytest.approx(8.95, abs=0.06)
+    # Along the force itself no point can be told
+    assert np.allclose(push.point[[0, 2]], at[[0, 2]], atol=0.05)
+
+
+def test_pieces_are_joined_in_order() -> None:
+    whole = swinging(np.zeros((2000, 3)), motion())
+    late = replace(whole, time=whole.time + 100.0)
+    assert np.all(np.diff(joined([late, whole]).time) > 0.0)
+
+
+def test_a_massless_rider_travels_as_its_equation_says() -> None:
+    step, omega = 0.005, 2.0 * np.pi * 0.8
+    t = step * np.arange(24000)
+    force = np.zeros((t.size, 3))
+    force[:, 0] = np.sin(omega * t)
+    found = travels(force, np.zeros((t.size, 3)), step)
+    for frequency in FREQUENCIES[6:20:5]:
+        own = 2.0 * np.pi * frequency
+        answer = -1.0 / (own**2 - omega**2 + 2j * DAMPING * own * omega)
+        q, acceleration = found["x", frequency]
+        late = t > 100.0
+        expected = np.imag(answer * np.exp(1j * omega * t))
+        assert np.max(np.abs(q - expected)[late]) < 1e-3 * abs(answer)
+        assert np.max(np.abs(acceleration + omega**2 * expected)[late]) < 2e-2 * omega**2 * abs(answer)
+        assert np.max(np.abs(found["y", frequency][0])) == 0.0
+
+
+def test_supports_change_the_model_and_nothing_else() -> None:
+    sample = thesis_case_14()
+    model = with_rest(sample.model())
+    ceiling, parameters = ceiling_candidate(sample.rig, model, 1200.0, 2).built(model)
+    assert ceiling.internal == 1
+    assert {p.name.split(".")[1] for p in parameters} == {"compliance", "frequency", "damping_ratio"}
+    assert ceiling.physics[place.internal_block(4, 0) + layout.AXIS + 2] == 1.0
+    elastic, shared = cable_elasticity(sample.rig, model, 1200.0, 5e6).built(model)
+    assert np.all(elastic.modes == layout.ELASTIC)
+    assert len(shared[0].also) == 3
+    assert shared[0].value(0.0) == pytest.approx(5e6)
+    assert shared[0].position(shared[0].value(0.7)) == pytest.approx(0.7)
+    # A centimetre under the body's weight
+    assert largest_compliance(sample.rig, 1200.0) * 1200.0 * sample.rig.gravity == pytest.approx(0.01)
+
+
+def test_a_wrench_moves_every_sample_as_running_the_model_again_does(
+    short: tuple[Problem, Run, Array, State],  # noqa: F811
+) -> None:
+    problem, run, theta, start = short
+    nominal = linearise_run(problem.bench, run, theta, start, start_only=True)
+    assert nominal is not None
+    wrench = np.zeros((run.grid.nodes, 6))
+    wrench[20:40, 1] = 5.0
+    wrench[30:60, 5] = -2.0
+    moved = linearise_run(problem.bench, run, theta, start, start_only=True, latent=wrench)
+    assert moved is not None
+    # What the noise is taken to be moves with the latent wrench: compare before whitening
+    plain = (nominal.plain - moved.plain) / np.sqrt(nominal.variance)
+    assert np.max(np.abs(plain)) > 1.0
+    alone = replace(nominal, Q=np.zeros_like(nominal.Q))
+    change = whitened_response(alone, wrench[:, :, None])[:, 0]
+    assert np.max(np.abs(plain - change)) < 0.02 * np.max(np.abs(change))
