@@ -122,8 +122,8 @@ def test_a_wrench_moves_every_sample_as_running_the_model_again_does(
     nominal = linearise_run(problem.bench, run, theta, start, start_only=True)
     assert nominal is not None
     wrench = np.zeros((run.grid.nodes, 6))
-    wrench[20:40, 1] = 5.0
-    wrench[30:60, 5] = -2.0
+    wrench[20:40, 1] = 50.0
+    wrench[30:60, 5] = -20.0
     moved = linearise_run(problem.bench, run, theta, start, start_only=True, latent=wrench)
     assert moved is not None
     # What the noise is taken to be moves with the latent wrench: compare before whitening
