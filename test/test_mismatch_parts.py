@@ -122,13 +122,13 @@ def test_a_wrench_moves_every_sample_as_running_the_model_again_does(
     nominal = linearise_run(problem.bench, run, theta, start, start_only=True)
     assert nominal is not None
     wrench = np.zeros((run.grid.nodes, 6))
-    wrench[20:40, 1] = 50.0
-    wrench[30:60, 5] = -20.0
+    wrench[20:40, 1] = 5.0
+    wrench[30:60, 5] = -2.0
     moved = linearise_run(problem.bench, run, theta, start, start_only=True, latent=wrench)
     assert moved is not None
     # What the noise is taken to be moves with the latent wrench: compare before whitening
     plain = (nominal.plain - moved.plain) / np.sqrt(nominal.variance)
-    assert np.max(np.abs(plain)) > 1.0
+    assert np.max(np.abs(plain)) > 0.5
     alone = replace(nominal, Q=np.zeros_like(nominal.Q))
     change = whitened_response(alone, wrench[:, :, None])[:, 0]
     assert np.max(np.abs(plain - change)) < 0.02 * np.max(np.abs(change))
