@@ -31,7 +31,6 @@ class Candidate:
     build: Build | None = None  # where the effect changes more than numbers
     #: Start states that suit the changed model, from a fit without it
     settle: Callable[[Problem, Point, Evaluation], Point] | None = None
-    #: The kind of thing; effects of one family are told apart by evidence, not by how they look
     experiment: str = ""  # what would tell it from its rivals
 
     @property

@@ -82,12 +82,11 @@ def travels(force: Array, gravity: Array, step: float) -> dict[tuple[str, float]
     return out
 
 
-def _pieces_of(evaluation: Evaluation, problem: Problem) -> dict[str, list[int]]:
+def _pieces_of(problem: Problem) -> dict[str, list[int]]:
     """Runs of a problem by recording, in order of time."""
     groups: dict[str, list[int]] = {}
     for i, run in enumerate(problem.runs):
         groups.setdefault(run.recording.name, []).append(i)
-    _ = evaluation
     return {name: sorted(which, key=lambda i: problem.runs[i].offset) for name, which in groups.items()}
 
 
@@ -99,7 +98,7 @@ def rider_wrenches(problem: Problem, evaluation: Evaluation) -> dict[int, Array]
     R_rest = model.physics[first : first + 9].reshape(3, 3)
     middle = middle_of(rig)
     out: dict[int, Array] = {}
-    for which in _pieces_of(evaluation, problem).values():
+    for which in _pieces_of(problem).values():
         raw = np.concatenate(
             [evaluation.runs[i].motion.outputs[: None if i == which[-1] else -1] for i in which]
         )

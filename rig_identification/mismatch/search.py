@@ -285,11 +285,6 @@ def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list
         o = {p.name: p for p in first.candidate.parameters}
         swing = Swing("xy", o["sprung_mass.frequency"].nominal)
         at = np.array([o[f"sprung_mass.position.{a}"].nominal for a in AXES])
-        out.append(
-            Promise(*_with_gain(rider_candidate(problem, swing, mass, first.values["sprung_mass.mass"], at)))
-        )
+        liquid, values = rider_candidate(problem, swing, mass, first.values["sprung_mass.mass"], at)
+        out.append(Promise(liquid, 0.0, values))
     return out
-
-
-def _with_gain(found: tuple[Candidate, dict[str, float]]) -> tuple[Candidate, float, dict[str, float]]:
-    return found[0], 0.0, found[1]
