@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 import rig_identification
-from rig_identification.estimate.identify import fit_session
+from rig_identification.estimate.identify import fit_ideal
 from rig_identification.estimate.observability import elements_covariance, inertial_estimate
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import model_at
@@ -135,7 +135,7 @@ def one_session(geometry: str, number: int) -> dict[str, Any]:
     }
     begin = time.perf_counter()
     try:
-        fitted = fit_session(session)
+        fitted = fit_ideal(session, lambda _stage, _share: None).fitted
         estimate = inertial_estimate(fitted.problem, fitted.evaluation)
     except (FloatingPointError, np.linalg.LinAlgError) as error:
         return entry | {"converged": False, "failure": f"{type(error).__name__}: {error}"}

@@ -31,7 +31,9 @@ HOLD = 0.1
 #: Mean square residual of a short horizon above which the model lacks something, and the steps that the
 #: whole run is then worth.
 HOPELESS_SQUARE = 2.0
-ROUGH = 4
+ROUGH = 6
+#: Steps of the whole run's fit.
+STEPS = 20
 
 
 def misfit(evaluation: Evaluation) -> float:
@@ -66,7 +68,7 @@ def solve_growing(
     duration = max((run.grid.duration for run in problem.runs), default=0.0)
     ends = horizons(duration) if problem.runs else [0.0]
     guess = point.theta[:INERTIAL].copy()
-    worth = 20
+    worth = STEPS
     for i, end in enumerate(ends):
         whole = i == len(ends) - 1
         part = problem
@@ -89,6 +91,9 @@ def solve_growing(
             notify=None if notify is None else _at(notify, end, duration),
         )
         point = evaluation.point
+        if whole and worth == ROUGH and misfit(evaluation) < HOPELESS_SQUARE and not converged:
+            # The short horizon was slow, not hopeless
+            evaluation, converged = solve(part, point, iterations=STEPS)
         if misfit(evaluation) > HOPELESS_SQUARE:
             # What a few seconds cannot fit, the whole run cannot: a rough fit tells as much
             worth = ROUGH

@@ -266,13 +266,15 @@ def solve(
     *,
     iterations: int = 30,
     tolerance: float = 1e-3,
+    polish: float = 0.0,
     notify: Callable[[int, float], None] | None = None,
 ) -> tuple[Evaluation, bool]:
     """Minimise from ``point``: (last evaluation, whether it converged).
 
     Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
-    a step won less than POLISH of what stays unexplained, the fit ends there as well: the residuals judge it.
+    a step won less than ``polish`` of what stays unexplained, the fit ends there as well: a
+    hypothesis that leaves much is not worth following down every valley.
     A plateau, where nothing fits and nothing answers any more, does not count.
     """
     current = evaluate(problem, point)
@@ -289,7 +291,7 @@ def solve(
             if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
                 damping = max(damping * 0.1, 1e-9)
                 won, current = current.cost - trial.cost, trial
-                if max(won, tolerance) < POLISH * excess(current) and damping <= 1e-3:
+                if max(won, tolerance) < polish * excess(current) and damping <= 1e-3:
                     return current, not on_plateau(current)
                 break
             damping = max(damping, 1e-6) * 10.0

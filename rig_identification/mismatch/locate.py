@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.estimate.growing import misfit, settled_starts
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, excess, solve
 
 #: Factor on a device's noise that silences it, and on the exciter's.
 SILENT = 300.0
@@ -68,7 +68,9 @@ def find_liar(problem: Problem, evaluation: Evaluation) -> Liar | None:
     best: Liar | None = None
     for device in devices:
         try:
-            fitted, _ = solve(silenced(problem, device), evaluation.point, iterations=STEPS, tolerance=0.5)
+            fitted, _ = solve(
+                silenced(problem, device), evaluation.point, iterations=STEPS, tolerance=0.5, polish=POLISH
+            )
         except FloatingPointError:
             continue
         heard = [

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from rig_identification.estimate.growing import misfit, settled_starts
 from rig_identification.estimate.parameters import AXES, INERTIAL
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Problem, evaluate, excess, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of, find_liar
@@ -163,7 +163,7 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
             # A changed model throws the start states out first, and everything else would bend to that
             point = replace(point, starts=settled_starts(wide, point))
         steps = FIRST_STEPS if candidate.build is None else CHANGED_STEPS
-        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5)
+        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5, polish=POLISH)
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < FAR)
@@ -172,7 +172,9 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
 def finished(trial: Trial) -> Trial | None:
     """The trial fitted to its end; None where its sign makes no sense there."""
     if not trial.settled:
-        fitted, _ = solve(trial.problem, trial.evaluation.point, iterations=LAST_STEPS, tolerance=0.05)
+        fitted, _ = solve(
+            trial.problem, trial.evaluation.point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH
+        )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
     if trial.candidate.positive:
         i = trial.problem.bench.parameters.index_of(trial.candidate.parameters[0].name)
