@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, Linearised
-from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, shortened, solve
+from rig_identification.estimate.solve import (
+    POLISH,
+    Evaluation,
+    Point,
+    Problem,
+    fit_start,
+    shortened,
+    solve,
+)
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -28,10 +36,8 @@ GROWTH = 4.0
 HOLD = 0.1
 
 
-#: Mean square residual of a short horizon above which the model lacks something, and the steps that the
-#: whole run is then worth.
+#: Mean square residual of a short horizon above which the model may lack something.
 HOPELESS_SQUARE = 2.0
-ROUGH = 6
 #: Steps of the whole run's fit.
 STEPS = 20
 
@@ -68,7 +74,7 @@ def solve_growing(
     duration = max((run.grid.duration for run in problem.runs), default=0.0)
     ends = horizons(duration) if problem.runs else [0.0]
     guess = point.theta[:INERTIAL].copy()
-    worth = STEPS
+    polish = 0.0
     for i, end in enumerate(ends):
         whole = i == len(ends) - 1
         part = problem
@@ -86,17 +92,15 @@ def solve_growing(
         evaluation, converged = solve(
             part,
             point,
-            iterations=worth if whole else 12,
+            iterations=STEPS if whole else 12,
+            polish=polish,
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else _at(notify, end, duration),
         )
         point = evaluation.point
-        if whole and worth == ROUGH and misfit(evaluation) < HOPELESS_SQUARE and not converged:
-            # The short horizon was slow, not hopeless
-            evaluation, converged = solve(part, point, iterations=STEPS)
         if misfit(evaluation) > HOPELESS_SQUARE:
-            # What a few seconds cannot fit, the whole run cannot: a rough fit tells as much
-            worth = ROUGH
+            # What a few seconds cannot fit, the whole run hardly can: no valley is worth following far
+            polish = POLISH
     return evaluation, converged
 
 
