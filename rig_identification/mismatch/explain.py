@@ -58,24 +58,22 @@ def explain(found_ideal: Ideal, notify: Notify) -> Explained | None:
 
     Where the ideal model fails the search looks at short pieces.
     """
+    if found_ideal.pieces is None or found_ideal.careful is None:
+        # Every residual is noise: what hides within it is no finding
+        return None
     ideal = found_ideal.fitted
     problem = with_reference(ideal.problem, ideal.rest)
-    search = _Search(problem, problem, ideal.evaluation)
-    if found_ideal.pieces is not None and found_ideal.careful is not None:
-        here = with_reference(found_ideal.pieces, ideal.rest)
-        evaluation = evaluate(here, found_ideal.careful[1].point)
-        if evaluation is None:
-            return None
-        search.here, search.evaluation = here, evaluation
-        pushed = _pushed(ideal, search, notify)
-        if pushed is not None:
-            return pushed
+    here = with_reference(found_ideal.pieces, ideal.rest)
+    evaluation = evaluate(here, found_ideal.careful[1].point)
+    if evaluation is None:
+        return None
+    search = _Search(problem, here, evaluation)
+    pushed = _pushed(ideal, search, notify)
+    if pushed is not None:
+        return pushed
     start = excess(search.evaluation)
     best = _named(ideal, search, notify)
     if best is not None and best.mismatch.verdict == "explained":
-        return best
-    if found_ideal.pieces is None:
-        # Nothing but a hint that no effect explains: the residuals are noise all the same
         return best
     return _unexplained(ideal, search, best, start, notify)
 
