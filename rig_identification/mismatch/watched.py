@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.estimate.cautious import reweighted, solve_cautiously
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import fit_start_growing, settled_starts
-from rig_identification.estimate.identify import ORDINARY, Fitted, Ideal, Scores, parameter_estimates, scores
+from rig_identification.estimate.identify import ORDINARY, Ideal, Scores, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import PIECE, pieces
