@@ -14,7 +14,7 @@ from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
-from rig_identification.estimate.growing import HOPELESS_SQUARE, fit_start_growing, misfit, solve_growing
+from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit, solve_growing
 from rig_identification.estimate.launch import Launch, launch_state
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
@@ -30,7 +30,7 @@ from rig_identification.estimate.segments import (
 )
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.verdict import judge
-from rig_identification.estimate.whole import fit_whole
+from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import State, rig_model
 from rig_identification.recording import Session
@@ -169,19 +169,14 @@ def fit_session(session: Session, progress: Progress = _silent) -> Fitted:
         notify=lambda fraction, text: progress(f"fit: {text}", 0.15 + 0.45 * fraction),
     )
     progress("predicting held-out runs", 0.6)
-    outcomes = []
-    for run in start.held:
-        state = launch_state(start.problem.bench, run, evaluation.point.theta, start.rest)
-        result = fit_start_growing(start.problem.bench, run, evaluation.point.theta, state)
-        if result is not None:
-            outcomes.append((run, result[0]))
+    held_runs, held_out = predicted(start.problem, start.held, evaluation.point.theta, start.rest)
     return Fitted(
         start.problem,
         evaluation,
         converged,
         start.rest,
-        tuple(run for run, _ in outcomes),
-        tuple(linearised for _, linearised in outcomes),
+        held_runs,
+        held_out,
         start.notes,
         start.point,
         start.held_parts,

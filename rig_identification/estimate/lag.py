@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 #: How far a lagging device may be from its steady answer when a run starts, in std of what it shows.
 UNSETTLED = 3.0
-#: Time constant, in node intervals, below which nothing of it is left at the first node.
-FORGOTTEN = 0.3
 
 
 def unsettled(step: float, tau: float, node: NDArray[np.int64], values: Array) -> Array:

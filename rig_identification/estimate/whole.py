@@ -29,25 +29,25 @@ def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fi
         for run in whole.runs
     )
     evaluation, converged = solve(whole, Point(point.theta, starts, point.rest_guesses), iterations=20)
-    held_runs, held = _predicted(ideal, whole, evaluation.point.theta, rest)
+    held_runs, held = predicted(whole, ideal.holdout_runs, evaluation.point.theta, rest)
     return replace(
         ideal,
         problem=whole,
         evaluation=evaluation,
         converged=converged,
-        holdout_runs=tuple(held_runs),
-        holdouts=tuple(held),
+        holdout_runs=held_runs,
+        holdouts=held,
     )
 
 
-def _predicted(
-    ideal: Fitted, whole: Problem, theta: NDArray[np.float64], rest: State
-) -> tuple[list[Run], list[Linearised]]:
-    runs, predictions = [], []
-    for run in ideal.holdout_runs:
-        state = launch_state(whole.bench, run, theta, rest)
-        result = fit_start_growing(whole.bench, run, theta, state)
+def predicted(
+    problem: Problem, held: tuple[Run, ...], theta: NDArray[np.float64], rest: State
+) -> tuple[tuple[Run, ...], tuple[Linearised, ...]]:
+    """Held-out runs that can be followed from a start state of their own, and how they come out."""
+    outcomes = []
+    for run in held:
+        state = launch_state(problem.bench, run, theta, rest)
+        result = fit_start_growing(problem.bench, run, theta, state)
         if result is not None:
-            runs.append(run)
-            predictions.append(result[0])
-    return runs, predictions
+            outcomes.append((run, result[0]))
+    return tuple(run for run, _ in outcomes), tuple(linearised for _, linearised in outcomes)

@@ -15,13 +15,14 @@ import numpy as np
 
 from rig_identification.estimate.cautious import reweighted, solve_cautiously
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.growing import fit_start_growing, settled_starts
+from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import ORDINARY, Ideal, Scores, parameter_estimates, scores
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import PIECE, pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.verdict import judge
+from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hands import hand_finding
 from rig_identification.mismatch.left_out_physics import left_out_physics
@@ -124,20 +125,14 @@ def _whole(ideal: Fitted, found: list[Trial], weights: Problem, evaluation: Eval
     scored = evaluate(wide, fitted.point)
     if scored is None:
         raise FloatingPointError("the fitted motion cannot be followed")
-    held_runs, held = [], []
-    for run in ideal.holdout_runs:
-        state = launch_state(wide.bench, run, fitted.point.theta, ideal.rest)
-        result = fit_start_growing(wide.bench, run, fitted.point.theta, state)
-        if result is not None:
-            held_runs.append(run)
-            held.append(result[0])
+    held_runs, held = predicted(wide, ideal.holdout_runs, fitted.point.theta, ideal.rest)
     return replace(
         ideal,
         problem=wide,
         evaluation=scored,
         converged=converged,
-        holdout_runs=tuple(held_runs),
-        holdouts=tuple(held),
+        holdout_runs=held_runs,
+        holdouts=held,
     )
 
 
