@@ -155,10 +155,6 @@ def test_a_gentle_bifilar_pendulum_hides_rolling_about_its_span() -> None:
     assert at_the_truth(session, truth).unobservable == ("Jyy",)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="known limit: the first horizon drives a thin body's spread to zero and the way back is too long",
-)
 def test_a_bifilar_pendulum_is_fitted_from_no_guess() -> None:
     session, truth = recorded(bifilar(), seed=2, duration=6.0)
     fitted = fit_session(session)

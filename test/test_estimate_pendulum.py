@@ -156,11 +156,6 @@ def test_simulated_pendulum_gives_its_vertical_inertia(simulated: tuple[Identifi
     assert element(answer, "Jzz") == pytest.approx(truth[zz], rel=0.03)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the fit creeps along a valley in Jyy (seen to second order only) and does not settle: "
-    "a clean pendulum is called unexplained",
-)
 def test_simulated_pendulum_claims_no_more_than_it_tells(
     simulated: tuple[Identification, np.ndarray],
 ) -> None:

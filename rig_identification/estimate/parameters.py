@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rig_identification.model import layout
 from rig_identification.model import sensors as devices
 from rig_identification.model.body import (
+    can_exist,
     complex_step_jacobian,
     elements_from_linear,
     linear_from_elements,
@@ -29,6 +30,9 @@ from rig_identification.rig import Rig
 Array = NDArray[np.float64]
 
 INERTIAL = 10
+#: Logarithms of a body's spreads within its vector, and the factor by which a straight step may shrink one.
+_SPREADS = slice(1, 4)
+THINNER = 3.0
 AXES = "xyz"
 
 # Devices and where their numbers start in the flat array ``device`` (see DeviceLayout)
@@ -325,6 +329,21 @@ class ParameterSet:
     def elements(self, theta: Array) -> Array:
         """Mass, centre of mass, inertia about it."""
         return elements_from_linear(linear_from_log_cholesky(theta[:INERTIAL]))
+
+    def moved(self, theta: Array, change: Array) -> Array:
+        """(n,) the vector after a step, the body along the straight line that its ten numbers make.
+
+        Motion is nearly linear in mass, centre of mass and inertia; in logarithms of spreads, two large
+        steps that leave what is observable alone to first order would not do so to second. Where that line
+        leads to no body, or to one far thinner, the step is made in the vector itself.
+        """
+        moved = theta + change
+        line = self.elements(theta) + self.elements_jacobian(theta) @ change[:INERTIAL]
+        if can_exist(line):
+            straight = log_cholesky_from_linear(linear_from_elements(line))
+            if np.all(straight[_SPREADS] - theta[_SPREADS] > -np.log(THINNER)):
+                moved[:INERTIAL] = straight
+        return moved
 
     def elements_jacobian(self, theta: Array) -> Array:
         """(10, 10) derivative of :meth:`elements` in the first ten entries."""

@@ -163,7 +163,7 @@ def _assemble(
 
 def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
     p = problem.bench.parameters.size
-    theta = evaluation.point.theta + change[:p]
+    theta = problem.bench.parameters.moved(evaluation.point.theta, change[:p])
     old = model_at(problem.bench.parameters, evaluation.point.theta)
     new = model_at(problem.bench.parameters, theta)
     starts, place = [], p
