@@ -35,9 +35,10 @@ GROWTH = 4.0
 #: Share of the weak prior's std within which short horizons may move the body from its first guess.
 HOLD = 0.1
 
-
 #: Mean square residual of a short horizon above which the model may lack something.
 HOPELESS_SQUARE = 2.0
+#: Mean square residual below which what a fit lacks is so small that first order tells it.
+NEAR_SQUARE = 1.3
 #: Steps of the whole run's fit.
 STEPS = 20
 

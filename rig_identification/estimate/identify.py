@@ -14,7 +14,7 @@ from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
-from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit, solve_growing
+from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
 from rig_identification.estimate.launch import Launch, launch_state
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
@@ -223,13 +223,13 @@ def scores(fitted: Fitted) -> Scores:
 
 @dataclass(frozen=True)
 class Ideal:
-    """The ideal model's fit, its verdict, and a cautious fit to short pieces where it fails."""
+    """The ideal model's fit, its verdict, and a cautious fit to short pieces where there is one."""
 
     fitted: Fitted
     scores: Scores
     mismatch: Mismatch
-    pieces: Problem | None  # the runs in short pieces
-    careful: tuple[Problem, Evaluation] | None  # their cautious fit (cautious.py)
+    pieces: Problem | None = None  # the runs in short pieces
+    careful: tuple[Problem, Evaluation] | None = None  # their cautious fit (cautious.py)
 
 
 #: What the report says of numbers that come from the cautious fit.
@@ -241,30 +241,42 @@ CAUTION = (
 
 
 def fit_ideal(session: Session, notify: Progress) -> Ideal:
-    """Fit the ideal model, judge it, and fit short pieces cautiously where it fails."""
+    """Fit the ideal model and judge it; fit short pieces cautiously where it fails by far."""
     fitted = fit_session(session, notify)
-    found, mismatch = _judged(fitted)
-    pieces, careful = None, None
-    if mismatch.verdict == "unexplained" and fitted.problem.runs:
-        notify("fitting short pieces, each channel weighed by its residual", 0.7)
-        point = fitted.evaluation.point
-        if fitted.guess is not None and misfit(fitted.evaluation) > HOPELESS_SQUARE:
-            # A model that lacks much bends everything to swallow it: start again from where nothing is bent
-            point = fitted.guess
-        pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
-        careful = solve_cautiously(pieces, start)
-        again = evaluate(pieces, careful[1].point)
-        if again is not None and misfit(again) < HOPELESS_SQUARE < misfit(fitted.evaluation):
-            # Short pieces fit: it was the way to the whole run's fit that failed, not the model
-            notify("fitting whole runs again", 0.9)
-            fitted = fit_whole(fitted, fitted.problem, pieces, careful[1].point)
-            found, mismatch = _judged(fitted)
-            if mismatch.verdict == "none":
-                pieces, careful = None, None
+    ideal = Ideal(fitted, *judged(fitted))
+    return ideal if near_noise(fitted) else with_pieces(ideal, notify)
+
+
+def near_noise(fitted: Fitted) -> bool:
+    """Whether a fit settled so near the noise that what it lacks is a small, linear thing."""
+    return fitted.converged and misfit(fitted.evaluation) < NEAR_SQUARE
+
+
+def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
+    """The same with a cautious fit of short pieces, where the ideal model does not explain the session."""
+    fitted, found, mismatch = ideal.fitted, ideal.scores, ideal.mismatch
+    if mismatch.verdict == "none" or not fitted.problem.runs or ideal.careful is not None:
+        return ideal
+    notify("fitting short pieces, each channel weighed by its residual", 0.7)
+    point = fitted.evaluation.point
+    if fitted.guess is not None and misfit(fitted.evaluation) > HOPELESS_SQUARE:
+        # A model that lacks much bends everything to swallow it: start again from where nothing is bent
+        point = fitted.guess
+    pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
+    careful = solve_cautiously(pieces, start)
+    again = evaluate(pieces, careful[1].point)
+    if again is not None and misfit(again) < HOPELESS_SQUARE < misfit(fitted.evaluation):
+        # Short pieces fit: it was the way to the whole run's fit that failed, not the model
+        notify("fitting whole runs again", 0.9)
+        fitted = fit_whole(fitted, fitted.problem, pieces, careful[1].point)
+        found, mismatch = judged(fitted)
+        if mismatch.verdict == "none":
+            return Ideal(fitted, found, mismatch)
     return Ideal(fitted, found, mismatch, pieces, careful)
 
 
-def _judged(fitted: Fitted) -> tuple[Scores, Mismatch]:
+def judged(fitted: Fitted) -> tuple[Scores, Mismatch]:
+    """Errors of a fit, and whether the model in it explains the session."""
     found = scores(fitted)
     parameters = parameter_estimates(fitted.problem, fitted.evaluation)
     return found, judge(fitted, parameters, found.holdout, found.training, ORDINARY)
@@ -299,7 +311,7 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     Raises InputError where the session holds nothing to fit.
     """
     notify = progress or _silent
-    ideal = fit_ideal(session, notify)
+    ideal = with_pieces(fit_ideal(session, notify), notify)
     notify("done", 1.0)
     return compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
 

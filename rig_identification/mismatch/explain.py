@@ -9,15 +9,32 @@ import numpy as np
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.identify import ORDINARY, Ideal, parameter_estimates, scores
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
-from rig_identification.estimate.verdict import judge
+from rig_identification.estimate.growing import misfit, settled_starts
+from rig_identification.estimate.identify import (
+    ORDINARY,
+    Ideal,
+    judged,
+    near_noise,
+    parameter_estimates,
+    with_pieces,
+)
+from rig_identification.estimate.segments import in_pieces
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.locate import Event, find_event
 from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.search import MOST_EFFECTS, Trial, adopted, catalogue, mass_of, trials
+from rig_identification.mismatch.search import (
+    MOST_EFFECTS,
+    Trial,
+    adopted,
+    beyond_doubt,
+    catalogue,
+    mass_of,
+    needed_gain,
+    strength,
+    trials,
+)
 from rig_identification.mismatch.unknown import push_finding, unknown_finding
 from rig_identification.result import Finding, Mismatch
 
@@ -35,10 +52,11 @@ MARGIN = 0.15
 
 @dataclass(frozen=True)
 class Explained:
-    """A fit with effects in it."""
+    """A fit with effects in it; beside it the cautious fit of the ideal model where that was needed."""
 
     fitted: Fitted
     mismatch: Mismatch
+    ideal: Ideal
 
 
 @dataclass
@@ -46,39 +64,49 @@ class _Search:
     """Where a search stands."""
 
     problem: Problem  # whole runs, ideal model
-    here: Problem  # what hypotheses are tried on
+    here: Problem  # what hypotheses are tried on: short pieces where much is left, whole runs near the noise
     evaluation: Evaluation
+    start: float  # excess in short pieces before anything was found
+    share: float = 0.0  # of that excess that the effects found take away
     found: list[Trial] = field(default_factory=list)
     rivals: list[dict[str, object]] = field(default_factory=list)
     liar: str | None = None
 
+    @property
+    def whole(self) -> bool:
+        """Whether hypotheses are tried on whole runs."""
+        return len(self.here.runs) == len(self.problem.runs)
 
-def explain(found_ideal: Ideal, notify: Notify) -> Explained | None:
-    """Search for what the ideal model leaves out; None where nothing is found.
 
-    Where the ideal model fails the search looks at short pieces.
+def explain(ideal: Ideal, notify: Notify) -> Explained | None:
+    """Search for what the ideal model leaves out; None where every residual is noise.
+
+    Near the noise the search looks at whole runs, which say most; where the ideal model fails by
+    far, at short pieces, in which no model is far off.
     """
-    if found_ideal.pieces is None or found_ideal.careful is None:
-        # Every residual is noise: what hides within it is no finding
+    if ideal.mismatch.verdict == "none":
+        # What hides within noise is no finding
         return None
-    ideal = found_ideal.fitted
-    problem = with_reference(ideal.problem, ideal.rest)
-    here = with_reference(found_ideal.pieces, ideal.rest)
-    evaluation = evaluate(here, found_ideal.careful[1].point)
+    fitted = ideal.fitted
+    problem = with_reference(fitted.problem, fitted.rest)
+    if ideal.pieces is None or ideal.careful is None:
+        here, point = problem, fitted.evaluation.point
+    else:
+        here, point = with_reference(ideal.pieces, fitted.rest), ideal.careful[1].point
+    evaluation = evaluate(here, point)
     if evaluation is None:
         return None
-    search = _Search(problem, here, evaluation)
+    search = _Search(problem, here, evaluation, excess(evaluation))
     pushed = _pushed(ideal, search, notify)
     if pushed is not None:
         return pushed
-    start = excess(search.evaluation)
     best = _named(ideal, search, notify)
     if best is not None and best.mismatch.verdict == "explained":
         return best
-    return _unexplained(ideal, search, best, start, notify)
+    return _unexplained(ideal, search, best, notify)
 
 
-def _named(ideal: Fitted, search: _Search, notify: Notify) -> Explained | None:
+def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
     """Effects of the catalogue, one after the other, until the whole runs are explained."""
     candidates = catalogue(search.problem)
     best: Explained | None = None
@@ -97,50 +125,86 @@ def _named(ideal: Fitted, search: _Search, notify: Notify) -> Explained | None:
             break
         first = tried.done[0]
         search.found.append(first)
-        search.rivals += [
-            {
-                "effect": t.candidate.effect,
-                "where": dict(t.candidate.where),
-                "log_likelihood_gap": float(first.evidence - t.evidence),
-                "experiment": t.candidate.experiment or first.candidate.experiment,
-            }
-            for t in tried.done[1:]
-        ]
+        search.rivals += [_rival(t, first) for t in tried.done[1:]]
         search.here, search.evaluation = adopted(search.here, search.evaluation, first)
+        if not search.whole:
+            search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         if misfit(search.evaluation) > EXPLAINED:
             # Something large is left: there is no use yet in whole runs
             continue
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = _whole(ideal, search)
         if best.mismatch.verdict == "explained":
-            break
+            return _pruned(best, search, len(candidates))
+        if near_noise(best.fitted):
+            search.here, search.evaluation = best.fitted.problem, best.fitted.evaluation
     return best
 
 
-def _whole(ideal: Fitted, search: _Search) -> Explained:
-    whole = extended(search.problem, tuple(t.candidate for t in search.found))
-    known = search.evaluation.point
-    point = replace(known, theta=carried(whole, search.here, known).theta)
-    fitted = fit_whole(ideal, whole, search.here, point)
-    return Explained(fitted, _mismatch(ideal, fitted, search))
+def _rival(trial: Trial, first: Trial) -> dict[str, object]:
+    return {
+        "effect": trial.candidate.effect,
+        "where": dict(trial.candidate.where),
+        "log_likelihood_gap": float(first.evidence - trial.evidence),
+        "experiment": trial.candidate.experiment or first.candidate.experiment,
+    }
 
 
-def _mismatch(ideal: Fitted, fitted: Fitted, search: _Search) -> Mismatch:
-    before, after = scores(ideal), scores(fitted)
+def _whole(ideal: Ideal, search: _Search) -> Explained:
+    return _fitted_whole(ideal, search, search.found, search.here, search.evaluation.point)
+
+
+def _fitted_whole(
+    ideal: Ideal, search: _Search, found: list[Trial], here: Problem, known: Point
+) -> Explained:
+    """Whole runs with the effects ``found``, from a ``known`` point of the problem ``here``."""
+    whole = extended(search.problem, tuple(t.candidate for t in found))
+    point = replace(known, theta=carried(whole, here, known).theta)
+    fitted = fit_whole(ideal.fitted, whole, here, point)
+    return Explained(fitted, _mismatch(ideal, fitted, found, search.rivals), ideal)
+
+
+def _pruned(best: Explained, search: _Search, count: int) -> Explained:
+    """The explanation less what it can do without: an early effect may only have stood in for a later one."""
+    kept = list(search.found)
+    while len(kept) > 1:
+        fitted = best.fitted
+        here = [replace(t, problem=fitted.problem, evaluation=fitted.evaluation) for t in kept]
+        strengths = [strength(t) - needed_gain(t.candidate, count) for t in here]
+        ordinary = {p.name: p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
+        for i, t in enumerate(here):
+            if t.candidate.build is not None:
+                # What swings or gives way has states of its own: no small thing to take back
+                strengths[i] = np.inf
+            elif not beyond_doubt(t, ordinary, ORDINARY):
+                strengths[i] = min(strengths[i], 0.0)
+        weakest = int(np.argmin(strengths))
+        if strengths[weakest] > 0.0:
+            break
+        less = [t for i, t in enumerate(kept) if i != weakest]
+        again = _fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
+        if again.mismatch.verdict != "explained":
+            break
+        best, kept = again, less
+    return best
+
+
+def _mismatch(ideal: Ideal, fitted: Fitted, found: list[Trial], rivals: list[dict[str, object]]) -> Mismatch:
+    after, verdict = judged(fitted)
+    before = ideal.scores.holdout
     parameters = parameter_estimates(fitted.problem, fitted.evaluation)
-    judged = judge(fitted, parameters, after.holdout, after.training, ORDINARY)
-    gain = ideal.evaluation.cost - fitted.evaluation.cost
+    gain = ideal.fitted.evaluation.cost - fitted.evaluation.cost
     values = {p.name: p.value for p in parameters}
     # An error beyond what is ordinary comes on top of an ordinary one, and only their sum is seen
-    ordinary = {p.name: p.prior_std for p in ideal.problem.bench.parameters.free}
+    ordinary = {p.name: p.prior_std for p in ideal.fitted.problem.bench.parameters.free}
     stds = {p.name: float(np.hypot(p.std, ordinary.get(p.name, 0.0))) for p in parameters}
-    findings = tuple(finding(t, values, stds, gain, before.holdout, after.holdout) for t in search.found)
+    findings = tuple(finding(t, values, stds, gain, before, after.holdout) for t in found)
     named = ", ".join(f.effect for f in findings)
-    if judged.verdict == "none":
-        text = f"With {named} in the model every residual is noise. {_errors(before.holdout, after.holdout)}"
-        return Mismatch("explained", text, findings, tuple(search.rivals))
-    text = f"{named} explains part of it; something is left. {judged.explanation}"
-    return Mismatch("unexplained", text, findings, tuple(search.rivals))
+    if verdict.verdict == "none":
+        text = f"With {named} in the model every residual is noise. {_errors(before, after.holdout)}"
+        return Mismatch("explained", text, findings, tuple(rivals))
+    text = f"{named} explains part of it; something is left. {verdict.explanation}"
+    return Mismatch("unexplained", text, findings, tuple(rivals))
 
 
 def _errors(before: float | None, after: float | None) -> str:
@@ -150,10 +214,10 @@ def _errors(before: float | None, after: float | None) -> str:
     return f"Held-out error {number(before)} before, {number(after)} after (1 is a perfect model)."
 
 
-def _pushed(ideal: Fitted, search: _Search, notify: Notify) -> Explained | None:
+def _pushed(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
     """The session without the seconds in which something pushed; None where nothing did, or more is wrong."""
     squares = [float(np.mean(run.residual**2)) for run in search.evaluation.runs]
-    if max(squares) < UNEVEN * float(np.median(squares)):
+    if search.whole or max(squares) < UNEVEN * float(np.median(squares)):
         return None
     notify("search: a push", 0.05)
     event = find_event(search.here, search.evaluation)
@@ -161,25 +225,23 @@ def _pushed(ideal: Fitted, search: _Search, notify: Notify) -> Explained | None:
         return None
     mass = mass_of(search.here, search.evaluation)
     at = replace(search.evaluation, point=event.point)
-    told = push_finding(search.here, at, ideal.rest, mass, event)
+    told = push_finding(search.here, at, ideal.fitted.rest, mass, event)
     if told is None:
         return None
     push, start, end = told
     parts = tuple(part for run in search.problem.runs for part in _without(run, event, start, end))
     whole = replace(search.problem, runs=parts)
-    fitted = fit_whole(ideal, whole, search.here, event.point)
-    before, after = scores(ideal), scores(fitted)
-    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
-    judged = judge(fitted, parameters, after.holdout, after.training, ORDINARY)
-    if judged.verdict != "none":
+    fitted = fit_whole(ideal.fitted, whole, search.here, event.point)
+    after, verdict = judged(fitted)
+    if verdict.verdict != "none":
         return None
     evidence = {
-        "log_likelihood_gain": float(ideal.evaluation.cost - fitted.evaluation.cost),
-        "holdout_error_before": before.holdout,
+        "log_likelihood_gain": float(ideal.fitted.evaluation.cost - fitted.evaluation.cost),
+        "holdout_error_before": ideal.scores.holdout,
         "holdout_error_after": after.holdout,
     }
-    text = f"Outside the push every residual is noise. {_errors(before.holdout, after.holdout)}"
-    return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()))
+    text = f"Outside the push every residual is noise. {_errors(ideal.scores.holdout, after.holdout)}"
+    return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
 
 
 def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
@@ -197,43 +259,41 @@ def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
     return out
 
 
-def _unexplained(
-    ideal: Fitted, search: _Search, best: Explained | None, start: float, notify: Notify
-) -> Explained | None:
+def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: Notify) -> Explained:
     """What is told where something is left: named effects only where they take nearly all of it away."""
-    share = 1.0 - excess(search.evaluation) / max(start, 1.0)
-    convincing = bool(search.found) and share > CONVINCING and misfit(search.evaluation) < EXPLAINED**2
+    convincing = bool(search.found) and search.share > CONVINCING and misfit(search.evaluation) < EXPLAINED**2
+    ideal = with_pieces(ideal, notify)
     notify("search: the missing wrench", 0.95)
-    mass = mass_of(search.here, search.evaluation)
-    unknown = unknown_finding(search.here, search.evaluation, ideal.rest, mass, search.liar)
+    unknown = _unknown(ideal, search)
     if convincing and best is None:
         best = _whole(ideal, search)
     if convincing and best is not None:
         kept: tuple[Finding, ...] = best.mismatch.findings
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:
-        kept, fitted = (), ideal
+        kept, fitted, explanation = (), ideal.fitted, ideal.mismatch.explanation
         partly: list[dict[str, object]] = [
             {"effect": t.candidate.effect, "where": dict(t.candidate.where), "log_likelihood_gap": 0.0}
             for t in search.found
         ]
         rivals = (*partly, *search.rivals)
-        found = scores(ideal)
-        explanation = judge(
-            ideal,
-            parameter_estimates(ideal.problem, ideal.evaluation),
-            found.holdout,
-            found.training,
-            ORDINARY,
-        ).explanation
         if partly:
             named = ", ".join(str(p["effect"]) for p in partly)
-            explanation += (
-                f" {named} would take away {100 * max(share, 0.0):.0f} % of it, which does not convince."
-            )
-    if unknown is None and not kept:
-        return None
-    before = scores(ideal).holdout
+            explanation += f" {named} would take away a part of it, which does not convince."
+    before = ideal.scores.holdout
     evidence = {"log_likelihood_gain": 0.0, "holdout_error_before": before, "holdout_error_after": before}
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
-    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)))
+    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal)
+
+
+def _unknown(ideal: Ideal, search: _Search) -> Finding | None:
+    """A stand-in for what is left, seen in short pieces."""
+    here, evaluation = search.here, search.evaluation
+    if search.whole:
+        point = evaluation.point
+        here, start = in_pieces(here, point.theta, ideal.fitted.rest, point.rest_guesses)
+        again = evaluate(here, replace(start, starts=settled_starts(here, start)))
+        if again is None:
+            return None
+        evaluation = again
+    return unknown_finding(here, evaluation, ideal.fitted.rest, mass_of(here, evaluation), search.liar)

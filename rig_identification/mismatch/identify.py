@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig_identification.estimate.identify import compose, fit_ideal, only_watched, scores
+from rig_identification.estimate.identify import compose, fit_ideal, only_watched, scores, with_pieces
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.watched import explain_watched
@@ -32,12 +32,14 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
         if progress is not None:
             progress(stage, fraction)
 
+    def searching(stage: str, fraction: float) -> None:
+        notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
+
     ideal = fit_ideal(session, lambda stage, fraction: notify(stage, IDEAL_SHARE * fraction))
     plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
-    if only_watched(ideal.fitted.problem) and ideal.pieces is not None:
-        watched = explain_watched(
-            ideal, lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
-        )
+    if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
+        ideal = with_pieces(ideal, searching)
+        watched = explain_watched(ideal, searching)
         if watched is not None:
             answer = compose(
                 session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful
@@ -51,19 +53,13 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
-            found = explain(
-                ideal,
-                lambda stage, fraction: notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction),
-            )
+            found = explain(ideal, searching)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
-    if found is not None and found.mismatch.verdict == "explained":
-        answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, None)
-        return replace(answer, figures={**answer.figures, "ideal": plain})
-    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
-    if note is not None:
-        plain = replace(plain, notes=(*plain.notes, note))
     if found is None:
-        return plain
-    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, ideal.careful)
+        ideal = with_pieces(ideal, searching)
+        plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
+        return plain if note is None else replace(plain, notes=(*plain.notes, note))
+    careful = None if found.mismatch.verdict == "explained" else found.ideal.careful
+    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful)
     return replace(answer, figures={**answer.figures, "ideal": plain})

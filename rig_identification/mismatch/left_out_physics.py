@@ -17,30 +17,30 @@ def _added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -
 
 
 def _tether(
-    block: int, mass: float, gravity: float, length: float, size: float, middle: np.ndarray
+    axes: str, block: int, mass: float, gravity: float, length: float, size: float, middle: np.ndarray
 ) -> Candidate:
-    spring = 0.2 * mass * gravity / length
-    parts = [
-        _added(f"tether.stiffness.{a}", "N/m", spring, block + place.TETHER_STIFFNESS + i)
-        for i, a in enumerate(AXES)
-    ]
-    parts += [
-        _added(f"tether.pull.{a}", "N", 0.02 * mass * gravity, block + place.TETHER_PULL + i)
-        for i, a in enumerate(AXES)
-    ]
+    """A tether that pulls along ``axes``: along one as a taut hose does, along all as one that hangs."""
+    spring, pull = 0.2 * mass * gravity / length, 0.02 * mass * gravity
+    parts = []
+    for a in axes:
+        i = AXES.index(a)
+        parts.append(_added(f"tether.stiffness.{a}", "N/m", spring, block + place.TETHER_STIFFNESS + i))
+        parts.append(_added(f"tether.pull.{a}", "N", pull, block + place.TETHER_PULL + i))
     parts += [
         _added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
         for i, a in enumerate(AXES)
     ]
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        stiff = {a: values[f"tether.stiffness.{a}"] for a in AXES}
+        stiff = {a: values[f"tether.stiffness.{a}"] for a in axes}
         main = max(stiff, key=lambda a: abs(stiff[a]))
         out: Told = {"stiffness": (stiff[main], stds[f"tether.stiffness.{main}"], "N/m")}
-        for a in AXES:
-            for what, unit in (("stiffness", "N/m"), ("pull", "N"), ("point", "m")):
-                name = f"tether.{what}.{a}"
-                out[f"{what}_{a}"] = (values[name], stds[name], unit)
+        for p in parts:
+            _, what, a = p.name.split(".")
+            if what == "point" or len(axes) > 1:
+                out[f"{what}_{a}"] = (values[p.name], stds[p.name], p.unit)
+            elif what == "pull":
+                out["preload"] = (abs(values[p.name]), stds[p.name], p.unit)
         return out
 
     return Candidate(
@@ -48,7 +48,7 @@ def _tether(
         tuple(parts),
         "A hose or wire pulls on the body with a stiffness of {value}.",
         "Let cables and hoses hang free in a long loop, or take them off.",
-        {"channel": None, "axis": None},
+        {"channel": None, "axis": axes if len(axes) == 1 else None},
         tell=told,
     )
 
@@ -116,7 +116,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             positive=True,
             name_in_result="linear_density",
         ),
-        _tether(block, mass, rig.gravity, length, size, middle),
+        *(_tether(axes, block, mass, rig.gravity, length, size, middle) for axes in (*AXES, AXES)),
     ]
     if rig.exciter is not None:
         out.append(

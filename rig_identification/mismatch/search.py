@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from rig_identification.estimate.growing import misfit, settled_starts
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit, settled_starts
+from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Problem, evaluate, excess, solve
 from rig_identification.mismatch.candidate import Candidate
@@ -54,9 +55,7 @@ FIRST_STEPS = 4
 CHANGED_STEPS = 9
 LAST_STEPS = 20
 FINISHED = 3
-#: Mean square of whitened residuals above which linear screening is not the last word, and the
-#: frequency (Hz) at which a body bounces on its cables where a fit of their stretch starts.
-FAR = 1.3
+#: Frequency (Hz) at which a body bounces on its cables where a fit of their stretch starts.
 BOUNCE = 12.0
 
 
@@ -166,7 +165,7 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
         fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5, polish=POLISH)
     except FloatingPointError:
         return None
-    return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < FAR)
+    return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
 
 
 def finished(trial: Trial) -> Trial | None:
@@ -195,6 +194,18 @@ def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool
     return any(abs(values[p.name] - p.nominal) > limit * ordinary[p.name] for p in freed)
 
 
+def strength(trial: Trial) -> float:
+    """Gain (nats) of the trial's parameters over none of them, to second order (Wald)."""
+    parameters = trial.problem.bench.parameters
+    free = {p.name: p for p in parameters.free}
+    index = [parameters.index_of(p.name) for p in trial.candidate.parameters if not free[p.name].ratio]
+    if not index:
+        return float(np.inf)
+    value = trial.evaluation.point.theta[index]
+    covariance = invert_information(trial.evaluation.information)[np.ix_(index, index)]
+    return 0.5 * float(value @ np.linalg.solve(covariance, value))
+
+
 def _at_noise(trial: Trial) -> bool:
     """Whether a hypothesis leaves residuals of the size of the noise."""
     return misfit(trial.evaluation) < AT_NOISE
@@ -218,7 +229,7 @@ def trials(
     says: it is far from linear.
     """
     mass = mass_of(problem, evaluation)
-    far = misfit(evaluation) > FAR
+    far = misfit(evaluation) > NEAR_SQUARE
     liar = None
     if far:
         problem, evaluation = worst_pieces(problem, evaluation)

@@ -6,7 +6,7 @@ unknowns of dynamics.py. Those of one mass share the numbers of their leader.
 A rider of mass m rests at a (body axes) and is displaced to rho = a + sum d_k q_k. Its own
 equation along d_j, divided by m so that it holds for a massless passenger as well,
     d_j . (A + alpha x rho + w x (w x rho) + 2 w x rho' + sum d_k q_k'' - (g - g_rest))
-        = -(2 pi f)^2 q_j - 2 zeta 2 pi f q_j'
+        = -(2 pi f)^2 q_j - 2 zeta 2 pi f d_j . sum d_k q_k'
 g_rest is gravity as the body feels it in its rest pose, where the rider's spring bears it.
 The body's ten numbers count the rider as fixed at a, so that the body feels the difference:
 point inertia and weight at rho less those at a, m 2 w x rho', and m d_k q_k''.
@@ -14,8 +14,8 @@ A liquid's first mode is a pendulum of length l = g/(2 pi f)^2 (Ibrahim, "Liquid
 2005, section 5.2): a rider with two coordinates along d_1 and d_2 that hangs instead of riding on
 springs, so that it rises along n = d_1 x d_2 by l - s, s = (l^2 - q^2)^1/2, as it swings:
     rho = a + sum d_k q_k + n (l - s),   t_k = d rho/d q_k = d_k + n q_k/s
-t_k stands for d_k above, g for g - g_rest, nothing for the spring, and the acceleration of rho
-gains n (q'.q'/s + (q.q')^2/s^3).
+t_k stands for d_k above (what damps it works along its path), g for g - g_rest, nothing for the
+spring, and the acceleration of rho gains n (q'.q'/s + (q.q')^2/s^3).
 
 A ceiling moves all upper hinges by d q. With compliance kappa = 1/k and f = (k/M)^(1/2)/2 pi
     q''/(2 pi f)^2 + 2 zeta q'/(2 pi f) + q = -kappa sum T_i u_i . d
@@ -216,7 +216,8 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
                     + dz * (physics[p + AXIS + 2] + nz * rise)
                 )
         q, speed = x[BODY_STATE + j], x[BODY_STATE + count + j]
-        r[row] = dx * (bx - cx) + dy * (by - cy) + dz * (bz - cz) - 2.0 * zeta * omega * speed
+        along = dx * sx + dy * sy + dz * sz
+        r[row] = dx * (bx - cx) + dy * (by - cy) + dz * (bz - cz) - 2.0 * zeta * omega * along
         if not hangs:
             r[row] -= omega * omega * q
         if stop.real > 0.0:
