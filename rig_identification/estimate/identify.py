@@ -248,8 +248,8 @@ def fit_ideal(session: Session, notify: Progress) -> Ideal:
 
 
 def near_noise(fitted: Fitted) -> bool:
-    """Whether a fit settled so near the noise that what it lacks is a small, linear thing."""
-    return fitted.converged and misfit(fitted.evaluation) < NEAR_SQUARE
+    """Whether a fit came so near the noise that what it lacks is a small, linear thing."""
+    return misfit(fitted.evaluation) < NEAR_SQUARE
 
 
 def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
@@ -288,9 +288,14 @@ def compose(
     found: Scores,
     mismatch: Mismatch,
     careful: tuple[Problem, Evaluation] | None,
+    loose: float = 1.0,
 ) -> Identification:
-    """Everything that a fit says of a session; the body from the cautious fit where there is one."""
+    """Everything that a fit says of a session; the body from the cautious fit where there is one.
+
+    loose: factor on the body's covariance, for a trace that the model leaves.
+    """
     total = inertial_estimate(*(careful or (fitted.problem, fitted.evaluation)))
+    total = replace(total, covariance=loose * total.covariance)
     frame = session.rig.frame
     return Identification(
         total=total,

@@ -158,9 +158,18 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
 
 
 def _channel_rows(
-    bench: Bench, run: Run, channel: Channel, motion: Motion, reading: sensors.Reading, own: Array
+    bench: Bench,
+    run: Run,
+    channel: Channel,
+    motion: Motion,
+    reading: sensors.Reading,
+    own: Array,
+    node: NDArray[np.int64],
 ) -> tuple[Array, Array, Array, Array]:
-    """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, X), D (g, w, 6))."""
+    """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, X), D (g, w, 6)).
+
+    node (g,): where each sample was taken.
+    """
     parameters = bench.parameters
     clock, lag = parameters.places.clock(channel.device), parameters.places.lag(channel.device)
     late, tau = own[clock], own[lag]
@@ -189,8 +198,8 @@ def _channel_rows(
             own_columns[:, :, column] -= s * (slope @ values)
         elif entry == lag:
             own_columns[:, :, column] -= s * (slope @ lagged(run.grid.step, tau, values))
-    H = in_raw[channel.node] @ motion_H[channel.node]
-    D = in_raw[channel.node] @ motion_D[channel.node]
+    H = in_raw[node] @ motion_H[node]
+    D = in_raw[node] @ motion_D[node]
     return residual, np.concatenate([jacobian, own_columns], axis=2), H, D
 
 
@@ -248,7 +257,12 @@ def linearise_run(
                 bench, channel.device, motion.outputs, motion.R_world_body, own, run.R_tracker_mean
             )
         tau = float(own[parameters.places.lag(channel.device)])
-        residual, jacobian, H, D = _channel_rows(bench, run, channel, motion, readings[channel.device], own)
+        # What a late device shows was shaken by the force of earlier: to the nearest node
+        late = float(own[parameters.places.clock(channel.device)]) + max(tau, 0.0)
+        node = np.clip(channel.node - round(late / run.grid.step), 0, run.grid.nodes - 1)
+        residual, jacobian, H, D = _channel_rows(
+            bench, run, channel, motion, readings[channel.device], own, node
+        )
         motion_width = starts + directions.size
         full = np.zeros((*residual.shape, width))
         full[:, :, parameters.size :] = jacobian[:, :, :starts]
@@ -258,7 +272,7 @@ def linearise_run(
         rows, axes = residual.size, channel.width
         stacked.append(
             (
-                np.repeat(channel.node, axes),
+                np.repeat(node, axes),
                 np.full(rows, index, dtype=np.int64),
                 np.tile(np.arange(axes), channel.node.size),
                 H.reshape(rows, -1),
@@ -269,17 +283,17 @@ def linearise_run(
                 np.concatenate([residual.reshape(rows, 1), full.reshape(rows, width)], axis=1),
             )
         )
-    node, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
-    order = np.argsort(node, kind="stable")
-    node, which, axis, H, D, variance, columns = (
-        np.ascontiguousarray(part[order]) for part in (node, which, axis, H, D, variance, columns)
+    at, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
+    order = np.argsort(at, kind="stable")
+    at, which, axis, H, D, variance, columns = (
+        np.ascontiguousarray(part[order]) for part in (at, which, axis, H, D, variance, columns)
     )
     plain = columns[:, 0].copy()
     Q = force_noise(run, parameters, theta)
     if extra_noise is not None:
         Q = Q + extra_noise
     if np.any(Q):
-        log_spread = float(whiten(motion.A, motion.B, Q, held, node, H, D, variance, columns))
+        log_spread = float(whiten(motion.A, motion.B, Q, held, at, H, D, variance, columns))
     else:
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
@@ -289,7 +303,7 @@ def linearise_run(
         columns[:, 1:],
         log_spread,
         motion,
-        node,
+        at,
         which,
         axis,
         plain,

@@ -240,6 +240,8 @@ HOPELESS = 100.0
 #: Share of what noise does not account for below which a step's gain is not worth taking: a model
 #: that lacks something has no optimum worth polishing.
 POLISH = 3e-3
+#: Gain (nats) of a step that gets nowhere, and how many of them in a row end a fit.
+CREEP, CREPT = 0.1, 4
 
 
 def excess(evaluation: Evaluation) -> float:
@@ -274,13 +276,14 @@ def solve(
     Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
     a step won less than ``polish`` of what stays unexplained, the fit ends there as well: a
-    hypothesis that leaves much is not worth following down every valley.
+    hypothesis that leaves much is not worth following down every valley. Steps that win next to nothing,
+    one after the other, end it too, unconverged: along bounds a valley may be followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count.
     """
     current = evaluate(problem, point)
     if current is None:
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
-    damping = 1e-6
+    damping, creeping = 1e-6, 0
     for iteration in range(iterations):
         while True:
             change = _bounded_step(problem, current, damping)
@@ -291,6 +294,9 @@ def solve(
             if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
                 damping = max(damping * 0.1, 1e-9)
                 won, current = current.cost - trial.cost, trial
+                creeping = creeping + 1 if won < CREEP else 0
+                if creeping == CREPT:
+                    return current, False
                 if max(won, tolerance) < polish * excess(current) and damping <= 1e-3:
                     return current, not on_plateau(current)
                 break

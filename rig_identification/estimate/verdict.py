@@ -87,14 +87,8 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
     return out
 
 
-def judge(
-    fitted: Fitted,
-    parameters: tuple[ParameterEstimate, ...],
-    holdout_error: float | None,
-    training_error: float,
-    ordinary: float,
-) -> Mismatch:
-    """Verdict ``none`` or ``unexplained`` with its reason."""
+def all_witnesses(fitted: Fitted) -> list[Witness]:
+    """Band powers of every channel of every run, fitted and held out."""
     witnesses: list[Witness] = []
     for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
         witnesses += residual_witnesses(run, linearised, linearised.residual)
@@ -103,6 +97,28 @@ def judge(
         full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
         if full is not None:
             witnesses += residual_witnesses(run, full, predictive_residual(fitted, full))
+    return witnesses
+
+
+def loudest(fitted: Fitted) -> float:
+    """Largest power of a band whose residual is not noise, in units of white noise; 1 where there is none.
+
+    A model that leaves such a band claims so many times too much of what it reads there.
+    """
+    witnesses = all_witnesses(fitted)
+    limit = np.log10(FALSE_ALARM / max(1, len(witnesses)))
+    return max([1.0, *(w.band.power for w in witnesses if w.band.log10_p < limit)])
+
+
+def judge(
+    fitted: Fitted,
+    parameters: tuple[ParameterEstimate, ...],
+    holdout_error: float | None,
+    training_error: float,
+    ordinary: float,
+) -> Mismatch:
+    """Verdict ``none`` or ``unexplained`` with its reason."""
+    witnesses = all_witnesses(fitted)
     pressed = _pressed(fitted, ordinary)
     beyond = [p for p in parameters if p.name in pressed]
     reasons = []

@@ -25,7 +25,7 @@ class Candidate:
     sentence: str  # with {value}, {std} and {where}
     advice: str  # what to do about it
     where: dict[str, object] = field(default_factory=dict)
-    positive: bool = False  # the first parameter cannot be negative
+    positive: int = 0  # so many of the first parameters cannot be negative
     tell: Callable[[dict[str, float], dict[str, float]], Told] | None = None  # from values and stds by name
     name_in_result: str = ""  # of the first parameter, where ``tell`` is not given
     build: Build | None = None  # where the effect changes more than numbers

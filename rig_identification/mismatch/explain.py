@@ -20,6 +20,7 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
+from rig_identification.estimate.verdict import loudest
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.locate import Event, find_event
@@ -44,6 +45,9 @@ Notify = Callable[[str, float], None]
 EXPLAINED = 1.3
 #: Share of the excess that named effects must take away to be told where something is left.
 CONVINCING = 0.95
+#: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
+#: model of a swinging liquid or a dry hinge is perfect.
+TRACE, TRACE_SQUARE = 0.01, 1.03
 #: How uneven pieces must be (worst over median mean square) for an event to be looked for.
 UNEVEN = 4.0
 #: What is cut off on either side of a push, s.
@@ -57,6 +61,7 @@ class Explained:
     fitted: Fitted
     mismatch: Mismatch
     ideal: Ideal
+    loose: float = 1.0  # factor on every variance where a trace is left
 
 
 @dataclass
@@ -161,7 +166,21 @@ def _fitted_whole(
     whole = extended(search.problem, tuple(t.candidate for t in found))
     point = replace(known, theta=carried(whole, here, known).theta)
     fitted = fit_whole(ideal.fitted, whole, here, point)
-    return Explained(fitted, _mismatch(ideal, fitted, found, search.rivals), ideal)
+    after, verdict = judged(fitted)
+    share = excess(fitted.evaluation) / max(excess(ideal.fitted.evaluation), 1.0)
+    trace = fitted.converged and share < TRACE and misfit(fitted.evaluation) < TRACE_SQUARE
+    loose = loudest(fitted) if trace and verdict.verdict != "none" else 1.0
+    findings = _findings(ideal, fitted, found, after.holdout, loose)
+    named = ", ".join(f.effect for f in findings)
+    errors = _errors(ideal.scores.holdout, after.holdout)
+    if verdict.verdict == "none":
+        told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
+    elif trace:
+        told, text = "explained", f"{named} explains all but a trace. {errors} {verdict.explanation}"
+    else:
+        told = "unexplained"
+        text = f"{named} explains part of it; something is left. {verdict.explanation}"
+    return Explained(fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose)
 
 
 def _pruned(best: Explained, search: _Search, count: int) -> Explained:
@@ -189,22 +208,17 @@ def _pruned(best: Explained, search: _Search, count: int) -> Explained:
     return best
 
 
-def _mismatch(ideal: Ideal, fitted: Fitted, found: list[Trial], rivals: list[dict[str, object]]) -> Mismatch:
-    after, verdict = judged(fitted)
-    before = ideal.scores.holdout
+def _findings(
+    ideal: Ideal, fitted: Fitted, found: list[Trial], after: float | None, loose: float
+) -> tuple[Finding, ...]:
+    """The effects in the recording contract's words. loose: factor on their variances."""
     parameters = parameter_estimates(fitted.problem, fitted.evaluation)
     gain = ideal.fitted.evaluation.cost - fitted.evaluation.cost
     values = {p.name: p.value for p in parameters}
     # An error beyond what is ordinary comes on top of an ordinary one, and only their sum is seen
     ordinary = {p.name: p.prior_std for p in ideal.fitted.problem.bench.parameters.free}
-    stds = {p.name: float(np.hypot(p.std, ordinary.get(p.name, 0.0))) for p in parameters}
-    findings = tuple(finding(t, values, stds, gain, before, after.holdout) for t in found)
-    named = ", ".join(f.effect for f in findings)
-    if verdict.verdict == "none":
-        text = f"With {named} in the model every residual is noise. {_errors(before, after.holdout)}"
-        return Mismatch("explained", text, findings, tuple(rivals))
-    text = f"{named} explains part of it; something is left. {verdict.explanation}"
-    return Mismatch("unexplained", text, findings, tuple(rivals))
+    stds = {p.name: float(np.sqrt(loose * p.std**2 + ordinary.get(p.name, 0.0) ** 2)) for p in parameters}
+    return tuple(finding(t, values, stds, gain, ideal.scores.holdout, after) for t in found)
 
 
 def _errors(before: float | None, after: float | None) -> str:

@@ -61,5 +61,5 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
         return plain if note is None else replace(plain, notes=(*plain.notes, note))
     careful = None if found.mismatch.verdict == "explained" else found.ideal.careful
-    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful)
+    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose)
     return replace(answer, figures={**answer.figures, "ideal": plain})

@@ -21,11 +21,14 @@ def _tether(
 ) -> Candidate:
     """A tether that pulls along ``axes``: along one as a taut hose does, along all as one that hangs."""
     spring, pull = 0.2 * mass * gravity / length, 0.02 * mass * gravity
-    parts = []
-    for a in axes:
-        i = AXES.index(a)
-        parts.append(_added(f"tether.stiffness.{a}", "N/m", spring, block + place.TETHER_STIFFNESS + i))
-        parts.append(_added(f"tether.pull.{a}", "N", pull, block + place.TETHER_PULL + i))
+    parts = [
+        _added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
+        for what, unit, std, entry in (
+            ("stiffness", "N/m", spring, place.TETHER_STIFFNESS),
+            ("pull", "N", pull, place.TETHER_PULL),
+        )
+        for a in axes
+    ]
     parts += [
         _added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
         for i, a in enumerate(AXES)
@@ -49,6 +52,7 @@ def _tether(
         "A hose or wire pulls on the body with a stiffness of {value}.",
         "Let cables and hoses hang free in a long loop, or take them off.",
         {"channel": None, "axis": axes if len(axes) == 1 else None},
+        positive=len(axes),
         tell=told,
     )
 
@@ -77,7 +81,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "The cables' hinges damp the motion: each puts {value} against the rate at which it turns.",
             "Use knife edges or ball joints, or keep the damping in the model.",
             {"channel": None, "axis": None},
-            positive=True,
+            positive=1,
             name_in_result="damping",
         ),
         Candidate(
@@ -86,7 +90,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "The cables' hinges rub: each holds against turning with {value}.",
             "Grease or replace the hinges; dry friction spoils small motions most.",
             {"channel": None, "axis": None},
-            positive=True,
+            positive=1,
             name_in_result="torque",
         ),
         Candidate(
@@ -95,7 +99,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "The air resists with the square of speed: a drag area of {value}.",
             "Keep speeds low, or keep the drag in the model.",
             {"channel": None, "axis": None},
-            positive=True,
+            positive=1,
             name_in_result="drag_area",
         ),
         Candidate(
@@ -104,7 +108,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "Air that moves with the body adds {value} to its inertia but not to its weight.",
             "Motion alone cannot tell entrained air from inertia: it shows against scale and statics.",
             {"channel": None, "axis": None},
-            positive=True,
+            positive=1,
             name_in_result="added_mass",
         ),
         Candidate(
@@ -113,7 +117,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "The cables weigh {value}.",
             "Weigh a length of the cable and enter it.",
             {"channel": None, "axis": None},
-            positive=True,
+            positive=1,
             name_in_result="linear_density",
         ),
         *(_tether(axes, block, mass, rig.gravity, length, size, middle) for axes in (*AXES, AXES)),
@@ -126,7 +130,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
                 "The exciter's moving mass of {value} rides on the body, unweighed.",
                 "Weigh the motor with its unbalance and add it to the body.",
                 {"channel": "exciter", "axis": None},
-                positive=True,
+                positive=1,
                 name_in_result="rotor_mass",
             )
         )

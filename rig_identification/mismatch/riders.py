@@ -183,7 +183,7 @@ def rider_candidate(
         f"{thing} {{value}} take part.",
         "Fill the tank to the brim or empty it." if liquid else "Block the springs or take the part off.",
         {"channel": None, "axis": None if liquid else swing.directions},
-        positive=True,
+        positive=1,
         tell=told,
         build=build,
         experiment=(

@@ -133,9 +133,20 @@ def _promise(
         # Replace the prior: precision 1 in the old units becomes ratio^2
         information[i, i] += ratio**2 - 1.0
         gradient[i] += point.theta[i] * (1.0 - ratio**2)
-    index = np.unique(np.concatenate([base, np.array(chosen, dtype=base.dtype)]))
     step = np.zeros(information.shape[0])
-    step[index] = _solve(information[np.ix_(index, index)], gradient[index])
+    while True:
+        index = np.unique(np.concatenate([base, np.array(chosen, dtype=base.dtype)]))
+        step[:] = 0.0
+        step[index] = _solve(information[np.ix_(index, index)], gradient[index])
+        wrong = [
+            column[q.name]
+            for q in candidate.parameters[: candidate.positive]
+            if column[q.name] in chosen and point.theta[column[q.name]] + step[column[q.name]] < 0.0
+        ]
+        if not wrong:
+            break
+        # What cannot be negative promises nothing by being so
+        chosen = [i for i in chosen if i not in wrong]
     gain = 0.5 * float(step[index] @ gradient[index]) - _gain(full.information, full.gradient, base)
     values = {q.name: free[i - INERTIAL].value(point.theta[i] + step[i]) for q, i in _with(candidate, column)}
     return Promise(candidate, gain, values)

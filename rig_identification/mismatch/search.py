@@ -20,6 +20,7 @@ from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Problem, evaluate, excess, solve
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of, find_liar
 from rig_identification.mismatch.riders import SWINGS, Swing, rider_candidate
@@ -36,7 +37,7 @@ Notify = Callable[[str], None]
 FALSE_ALARM = 0.005
 #: Hypotheses fitted in full after each screening, and effects looked for at most.
 FITTED = 4
-MOST_EFFECTS = 3
+MOST_EFFECTS = 2
 #: A promise this much (nats) behind the best is not worth a fit, in parts of the best.
 WORTH = 0.05
 #: Pieces that hypotheses are tried on.
@@ -44,6 +45,8 @@ TRIED = 4
 #: Log evidence that an effect has to gain.
 MEANT = 3.0
 TRIED_FAR = 2
+#: Std by which one of several numbers may lie on the wrong side of zero by chance.
+ABSURD = 3.0
 VERY_FAR = 5.0
 #: Mean square of whitened residuals below which nothing much is left, and how many times as much as the best
 #: a hypothesis may have left after its first steps to be its rival even so.
@@ -152,7 +155,7 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
             continue
         i = wide.bench.parameters.index_of(p.name)
         theta[i] = float(np.clip(p.position(promise.values[p.name]), -1.0, 1.0))
-        if candidate.positive and k == 0:
+        if k < candidate.positive:
             theta[i] = max(theta[i], 0.0)
     if candidate.settle is not None:
         point = candidate.settle(wide, replace(point, theta=theta), evaluation)
@@ -175,11 +178,19 @@ def finished(trial: Trial) -> Trial | None:
             trial.problem, trial.evaluation.point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
-    if trial.candidate.positive:
-        i = trial.problem.bench.parameters.index_of(trial.candidate.parameters[0].name)
-        if trial.evaluation.point.theta[i] <= 0.0:
-            return None
+    if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in _signs(trial)):
+        return None
     return trial
+
+
+def _signs(trial: Trial) -> list[float]:
+    """What cannot be negative, in units of its own std."""
+    parameters = trial.problem.bench.parameters
+    index = [parameters.index_of(p.name) for p in trial.candidate.parameters[: trial.candidate.positive]]
+    if not index:
+        return []
+    std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
+    return [float(trial.evaluation.point.theta[i] / std[i]) for i in index]
 
 
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
@@ -274,7 +285,7 @@ def trials(
         ended = finished(trial)
         if ended is not None and ended.evidence > needed and beyond_doubt(ended, ordinary, limit):
             done.append(ended)
-    return Trials(sorted(done, key=lambda t: -t.evidence), device)
+    return Trials(told_apart(done, MEANT), device)
 
 
 def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:

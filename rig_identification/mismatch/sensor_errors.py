@@ -210,7 +210,7 @@ def _added(
     p = Parameter(name, "s", 0.0, std, "device", first, bounded=False, also=tuple(others))
     where: dict[str, object] = {"channel": channel, "axis": None}
     return Candidate(
-        effect, (p,), text[0], text[1], where, positive=effect == "sensor_lag", name_in_result=told
+        effect, (p,), text[0], text[1], where, positive=int(effect == "sensor_lag"), name_in_result=told
     )
 
 

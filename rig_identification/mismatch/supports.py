@@ -97,7 +97,7 @@ def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, prob
         f"The ceiling yields along {a}: its stiffness is {{value}}.",
         "Hang the rig from a stiffer beam, or keep the ceiling in the model.",
         {"channel": "ceiling", "axis": a},
-        positive=True,
+        positive=1,
         tell=told,
         build=build,
         experiment="hang a known weight from the ceiling beside the rig and watch the hinges sink",
