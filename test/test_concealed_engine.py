@@ -111,7 +111,9 @@ def test_newton_and_euler_hold_with_the_true_inertia(moving: tuple[Scene, Trajec
     spin = change @ about_origin + np.cross(rate, rate @ about_origin)
     lever = body.mass * np.cross(arm, np.einsum("nji,nj->ni", rotation, path.acceleration))
     assert np.abs(moment - spin - lever).max() < 1e-5 * body.mass * scene.rig.gravity
-    assert np.abs(np.mean(force - body.mass * acceleration, axis=0)).max() < 1e-6 * body.mass * scene.rig.gravity
+    assert (
+        np.abs(np.mean(force - body.mass * acceleration, axis=0)).max() < 1e-6 * body.mass * scene.rig.gravity
+    )
 
 
 def test_cables_keep_their_length_and_pull(moving: tuple[Scene, Trajectory]) -> None:
@@ -186,7 +188,7 @@ def test_specific_force_is_that_of_the_lever_arms_end(moving: tuple[Scene, Traje
     felt = np.einsum("nji,nj->ni", rotation[10:-10], twice + np.array([0.0, 0.0, scene.rig.gravity]))
     inner = slice(100, None)  # the release itself is a step in acceleration
     difference = felt @ scene.devices.imu_rotation - sense(path, scene).specific_force[10:-10]
-    # This run is not scaled to what sessions hold: its stiff cables let positions and velocities differ so much
+    # This run is more violent than a session's: so much its velocities differ from its positions'
     assert np.abs(difference[inner]).max() < 5e-3
 
 

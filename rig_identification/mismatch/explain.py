@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rig_identification.estimate.cautious import solve_cautiously
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit, settled_starts
@@ -36,6 +37,7 @@ from rig_identification.mismatch.search import (
     strength,
     trials,
 )
+from rig_identification.mismatch.slack import Spell, slack_finding, slack_spells, taut_stretches
 from rig_identification.mismatch.unknown import push_finding, unknown_finding
 from rig_identification.result import Finding, Mismatch
 
@@ -92,6 +94,23 @@ def explain(ideal: Ideal, notify: Notify) -> Explained | None:
     if ideal.mismatch.verdict == "none":
         # What hides within noise is no finding
         return None
+    spells = _spells(ideal.fitted)
+    if not spells:
+        return _explain(ideal, notify)
+    notify("search: stretches in which every cable pulls", 0.02)
+    taut = _taut(ideal, spells)
+    if taut is None:
+        return _explain(ideal, notify)
+    found = None
+    if near_noise(taut.fitted):
+        found = _explain(taut, notify)
+    return _with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
+
+
+def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
+    """The search, on runs in which every cable pulls."""
+    if ideal.mismatch.verdict == "none":
+        return None
     fitted = ideal.fitted
     problem = with_reference(fitted.problem, fitted.rest)
     if ideal.pieces is None or ideal.careful is None:
@@ -109,6 +128,44 @@ def explain(ideal: Ideal, notify: Notify) -> Explained | None:
     if best is not None and best.mismatch.verdict == "explained":
         return best
     return _unexplained(ideal, search, best, notify)
+
+
+def _spells(fitted: Fitted) -> list[Spell]:
+    zeros = [p.prior_std for p in fitted.problem.bench.parameters.free if p.name.endswith("load_cell_zero")]
+    runs = (*fitted.problem.runs, *fitted.holdout_runs)
+    return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
+
+
+def _taut(ideal: Ideal, spells: list[Spell]) -> Ideal | None:
+    """The ideal model fitted between the spells, from where nothing is bent; None where nothing is left."""
+    fitted = ideal.fitted
+    runs = tuple(part for run in fitted.problem.runs for part in taut_stretches(run, spells))
+    held = tuple(part for run in fitted.holdout_runs for part in taut_stretches(run, spells))
+    if not runs:
+        return None
+    problem = replace(fitted.problem, runs=runs)
+    point = fitted.guess or fitted.evaluation.point
+    pieces, start = in_pieces(problem, point.theta, fitted.rest, point.rest_guesses)
+    careful = solve_cautiously(pieces, start)
+    again = fit_whole(replace(fitted, holdout_runs=held), problem, pieces, careful[1].point)
+    found = Ideal(again, *judged(again))
+    return found if near_noise(again) else replace(found, pieces=pieces, careful=careful)
+
+
+def _with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
+    """What was found between the spells, and the spells."""
+    before, after = ideal.scores.holdout, judged(found.fitted)[0].holdout
+    evidence = {
+        "log_likelihood_gain": float(ideal.fitted.evaluation.cost - found.fitted.evaluation.cost),
+        "holdout_error_before": before,
+        "holdout_error_after": after,
+    }
+    slack = replace(slack_finding(spells), evidence=evidence)
+    mismatch = found.mismatch
+    if mismatch.verdict == "none":
+        text = f"Where every cable pulls every residual is noise. {_errors(before, after)}"
+        mismatch = Mismatch("explained", text, (), ())
+    return replace(found, mismatch=replace(mismatch, findings=(slack, *mismatch.findings)))
 
 
 def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:

@@ -1,0 +1,54 @@
+"""A cable that carries nothing says so itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_estimate_prediction import recorded
+from test_model_rigs import random_sample
+
+from rig_identification.estimate.evidence import Run, prepare
+from rig_identification.mismatch.slack import slack_finding, slack_spells, taut_stretches
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    session, _ = recorded(random_sample(3, 3), seed=4, duration=8.0)
+    return prepare(session.rig, session.training[0])
+
+
+def _with_nothing(run: Run, start: float, end: float) -> Run:
+    channels = []
+    for c in run.channels:
+        values = c.values.copy()
+        if c.quantity == "tension" and c.device == run.channels[0].device:
+            loose = (c.time >= start) & (c.time <= end)
+            values[loose] = c.noise * np.random.default_rng(1).normal(size=(int(loose.sum()), 1))
+        channels.append(replace(c, values=values))
+    return replace(run, channels=tuple(channels))
+
+
+def test_a_taut_run_has_no_spells(run: Run) -> None:
+    assert slack_spells(run, 3.0) == []
+    assert [part.grid.nodes for part in taut_stretches(run, [])] == [run.grid.nodes]
+
+
+def test_a_spell_is_found_and_cut_out(run: Run) -> None:
+    loose = _with_nothing(run, 3.0, 3.4)
+    (spell,) = slack_spells(loose, 3.0)
+    assert spell.cable == run.channels[0].device
+    assert spell.start == pytest.approx(3.0, abs=0.02)
+    assert spell.end == pytest.approx(3.4, abs=0.02)
+    before, after = taut_stretches(loose, [spell])
+    assert before.offset == 0.0
+    assert before.grid.duration < 3.0 < 3.4 < after.offset
+    finding = slack_finding([spell])
+    assert finding.effect == "cable_slack"
+    assert finding.where["channel"] == spell.cable
+
+
+def test_a_glitch_is_no_spell(run: Run) -> None:
+    step = float(np.median(np.diff(run.channels[0].time)))
+    assert slack_spells(_with_nothing(run, 3.0, 3.0 + 1.5 * step), 3.0) == []
