@@ -178,12 +178,12 @@ def finished(trial: Trial) -> Trial | None:
             trial.problem, trial.evaluation.point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
-    if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in _signs(trial)):
+    if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial)):
         return None
     return trial
 
 
-def _signs(trial: Trial) -> list[float]:
+def signs(trial: Trial) -> list[float]:
     """What cannot be negative, in units of its own std."""
     parameters = trial.problem.bench.parameters
     index = [parameters.index_of(p.name) for p in trial.candidate.parameters[: trial.candidate.positive]]

@@ -27,7 +27,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hands import hand_finding
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import carried, extended
-from rig_identification.mismatch.search import Trial, finished, log_evidence, mass_of, needed_gain
+from rig_identification.mismatch.search import Trial, finished, log_evidence, mass_of, needed_gain, signs
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
@@ -41,6 +41,8 @@ STEPS = 8
 WHOLE_STEPS = 20
 #: Where a hypothesis starts, in units of its prior's std.
 FIRST_VALUE = 0.02
+#: Std by which an effect must differ from nothing beside all others.
+SHOWS = 2.0
 
 
 @dataclass(frozen=True)
@@ -74,11 +76,11 @@ def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Tr
 
 def _damped(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
-) -> tuple[list[Trial], list[dict[str, object]], Evaluation]:
-    """Effects added one by one while each gains more than chance, rivals of the first, and the fit."""
+) -> tuple[list[Trial], Evaluation, list[dict[str, object]]]:
+    """Effects added one by one while each gains more than chance, the fit, and rivals of the first."""
     found: list[Trial] = []
     rivals: list[dict[str, object]] = []
-    left = list(candidates)
+    left, base_problem = list(candidates), problem
     while left:
         base = log_evidence(evaluation)
         tried = []
@@ -104,7 +106,18 @@ def _damped(
         found.append(best)
         problem, evaluation = best.problem, best.evaluation
         left = [c for c in left if c.label != best.candidate.label]
-    return found, rivals, evaluation
+    return (*_needed(base_problem, found, evaluation), rivals)
+
+
+def _needed(problem: Problem, found: list[Trial], evaluation: Evaluation) -> tuple[list[Trial], Evaluation]:
+    """The effects less those that a later one left with nothing, fitted again without them."""
+    kept = [t for t in found if signs(replace(found[-1], candidate=t.candidate))[0] > SHOWS]
+    if not found or not kept or len(kept) == len(found):
+        return found, evaluation
+    wide = extended(problem, tuple(t.candidate for t in kept))
+    point = carried(wide, found[-1].problem, evaluation.point)
+    fitted, _ = solve(wide, point, iterations=STEPS, tolerance=0.5)
+    return [replace(t, problem=wide, evaluation=fitted) for t in kept], fitted
 
 
 def _whole(ideal: Fitted, found: list[Trial], weights: Problem, evaluation: Evaluation) -> Fitted:
@@ -172,7 +185,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     rig, parameters = ideal.problem.bench.rig, ideal.problem.bench.parameters
     every = left_out_physics(rig, parameters, mass_of(parts, evaluation))
     candidates = [c for c in every if c.effect in DAMPERS]
-    found, rivals, damped = _damped(parts, evaluation, candidates, notify)
+    found, damped, rivals = _damped(parts, evaluation, candidates, notify)
     if not found:
         return None
     notify("weighing each channel by its residual", 0.75)
