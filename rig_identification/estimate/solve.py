@@ -241,7 +241,7 @@ HOPELESS = 100.0
 #: that lacks something has no optimum worth polishing.
 POLISH = 3e-3
 #: Gain (nats) of a step that gets nowhere, and how many of them in a row end a fit.
-CREEP, CREPT = 0.1, 4
+CREEP, CREPT = 0.01, 4
 
 
 def excess(evaluation: Evaluation) -> float:
