@@ -189,6 +189,7 @@ def test_a_wrong_description_is_answered_with_a_finding(recorded: Path, tmp_path
         assert answer.success, answer.message
         mismatch = json.loads(answer.message)["mismatch"]
         assert mismatch["verdict"] == "explained"
+        assert [f["effect"] for f in mismatch["findings"]] == ["imu_position"], mismatch["findings"]
         (finding,) = mismatch["findings"]
         assert finding["effect"] == "imu_position"
         error = next(iter(finding["parameters"].values()))

@@ -50,6 +50,8 @@ CONVINCING = 0.95
 #: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
 #: model of a swinging liquid or a dry hinge is perfect.
 TRACE, TRACE_SQUARE = 0.01, 1.03
+#: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
+FIRM = 10.0
 #: How uneven pieces must be (worst over median mean square) for an event to be looked for.
 UNEVEN = 4.0
 #: What is cut off on either side of a push, s.
@@ -243,25 +245,29 @@ def _fitted_whole(
 def _pruned(best: Explained, search: _Search, count: int) -> Explained:
     """The explanation less what it can do without: an early effect may only have stood in for a later one."""
     kept = list(search.found)
+    ordinary = {p.name: p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
     while len(kept) > 1:
         fitted = best.fitted
         here = [replace(t, problem=fitted.problem, evaluation=fitted.evaluation) for t in kept]
-        strengths = [strength(t) - needed_gain(t.candidate, count) for t in here]
-        ordinary = {p.name: p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
-        for i, t in enumerate(here):
-            if t.candidate.build is not None:
-                # What swings or gives way has states of its own: no small thing to take back
-                strengths[i] = np.inf
-            elif not beyond_doubt(t, ordinary, ORDINARY):
-                strengths[i] = min(strengths[i], 0.0)
-        weakest = int(np.argmin(strengths))
-        if strengths[weakest] > 0.0:
-            break
-        less = [t for i, t in enumerate(kept) if i != weakest]
-        again = _fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
-        if again.mismatch.verdict != "explained":
-            break
-        best, kept = again, less
+        strengths = [
+            # What swings or gives way has states of its own: no small thing to take back
+            np.inf
+            if t.candidate.build is not None
+            else strength(t) / needed_gain(t.candidate, count)
+            if beyond_doubt(t, ordinary, ORDINARY)
+            else 0.0
+            for t in here
+        ]
+        for i in np.argsort(strengths):
+            if strengths[i] > FIRM:
+                return best
+            less = [t for k, t in enumerate(kept) if k != i]
+            again = _fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
+            if again.mismatch.verdict == "explained":
+                best, kept = again, less
+                break
+        else:
+            return best
     return best
 
 
