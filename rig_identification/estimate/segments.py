@@ -36,10 +36,10 @@ def pieces(run: Run, length: float = PIECE) -> tuple[Run, ...]:
 
 
 def in_pieces(
-    problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...]
+    problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...], length: float = PIECE
 ) -> tuple[Problem, Point]:
     """The same problem with every run in pieces, and a point with a start state for each."""
-    cut = tuple(piece for run in problem.runs for piece in pieces(run))
+    cut = tuple(piece for run in problem.runs for piece in pieces(run, length))
     starts = tuple(launch_state(problem.bench, piece, theta, rest) for piece in cut)
     return replace(problem, runs=cut), Point(theta, starts, rest_guesses)
 

@@ -16,12 +16,11 @@ import numpy as np
 from rig_identification.estimate.cautious import reweighted, solve_cautiously
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
-from rig_identification.estimate.identify import ORDINARY, Ideal, Scores, parameter_estimates, scores
+from rig_identification.estimate.identify import Ideal, Scores, judged, parameter_estimates
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
-from rig_identification.estimate.segments import PIECE, pieces
+from rig_identification.estimate.segments import PIECE, in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
-from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hands import hand_finding
@@ -53,13 +52,6 @@ class Watched:
     mismatch: Mismatch
     careful: tuple[Problem, Evaluation]
     unobservable: tuple[str, ...]  # beyond what the information matrix alone names
-
-
-def _in_long_pieces(problem: Problem, ideal: Fitted, theta) -> tuple[Problem, Point]:  # type: ignore[no-untyped-def]
-    cut = tuple(piece for run in problem.runs for piece in pieces(run, LONG_PIECE))
-    parts = replace(problem, runs=cut)
-    starts = tuple(launch_state(problem.bench, piece, theta, ideal.rest) for piece in cut)
-    return parts, Point(theta, starts, ideal.evaluation.point.rest_guesses)
 
 
 def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Trial | None:
@@ -177,7 +169,8 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
         return None
     notify("fitting in pieces", 0.05)
     start = found_ideal.careful[1].point.theta
-    parts, point = _in_long_pieces(ideal.problem, ideal, start)
+    guesses = ideal.evaluation.point.rest_guesses
+    parts, point = in_pieces(ideal.problem, start, ideal.rest, guesses, LONG_PIECE)
     evaluation, _ = solve(parts, point, iterations=STEPS, tolerance=0.5)
     parts = reweighted(parts, evaluation)
     again = evaluate(parts, evaluation.point)
@@ -192,15 +185,8 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     careful = solve_cautiously(found[-1].problem, damped.point)
     notify("search: whole runs", 0.85)
     fitted = _whole(ideal, found, careful[0], careful[1])
-    before, after = scores(ideal), scores(fitted)
-    verdict = judge(
-        fitted,
-        parameter_estimates(fitted.problem, fitted.evaluation),
-        after.holdout,
-        after.training,
-        ORDINARY,
-    )
-    errors = (before.holdout, after.holdout)
+    after, verdict = judged(fitted)
+    errors = (found_ideal.scores.holdout, after.holdout)
     gain = ideal.evaluation.cost - fitted.evaluation.cost
     findings = [_finding(t, fitted, careful[1], gain, errors) for t in found]
     hand = hand_finding(ideal)
