@@ -70,6 +70,9 @@ RIG = """\
     noise: {tension: 2.0, exciter_force: 0.5, specific_force: 0.01, angular_rate: 0.0003, inclination: 0.0003}
 """
 #: The simulated body: m, c, J (xx xy xz yy yz zz).
+#: s between a service's first sight and a first request: ``service_is_ready`` tells that this side knows the
+#: other, not that the other knows this one, and a request that comes before is lost (DDS-RPC 1.0, 7.6.2).
+ACQUAINTED = 0.5
 BODY = [990.2, 0.69, 1.08, -1.07, 1108.6, -1.4, 31.7, 338.3, 18.3, 1295.9]
 SIMULATOR = [
     f"body.mass:={BODY[0]}", f"body.center_of_mass:={BODY[1:4]}", f"body.inertia:={BODY[4:]}",
@@ -115,7 +118,9 @@ class Graph:
         self.rig_file.write_text(RIG)
         self.processes: list[subprocess.Popen[str]] = []
 
-    def start(self, name: str, *parameters: str, remaps: Sequence[str] = ()) -> subprocess.Popen[str]:
+    def start(
+        self, name: str, *parameters: str, remaps: Sequence[str] = (), **environment: str
+    ) -> subprocess.Popen[str]:
         """Start a node; that it is there is for the probe to see."""
         command = [sys.executable, "-m", "rig_identification.nodes", name, "--ros-args"]
         command += ["--params-file", str(self.rig_file)]
@@ -123,10 +128,10 @@ class Graph:
             command += ["-r", remap]
         for parameter in parameters:
             command += ["-p", parameter]
-        return self.run(command)
+        return self.run(command, **environment)
 
-    def run(self, command: Sequence[str]) -> subprocess.Popen[str]:
-        """Start any process that is to meet the graph's nodes."""
+    def run(self, command: Sequence[str], **environment: str) -> subprocess.Popen[str]:
+        """Start any process that is to meet the graph's nodes; ``environment`` on top of the usual one."""
         process = subprocess.Popen(
             command,
             cwd=self.folder,  # ``-m`` looks in the working directory first: a checkout would hide PACKAGE
@@ -134,6 +139,7 @@ class Graph:
                 ROS_DOMAIN_ID=str(self.domain),
                 ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
                 ROS_LOG_DIR=str(self.folder / "log"),
+                **environment,
             ),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -173,6 +179,7 @@ class Probe:
         self.node = rclpy.create_node("probe", namespace="/rig", context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
+        self._clients: dict[str, Any] = {}
 
     def spin_until(self, predicate: Callable[[], Any], timeout: float, what: str = "it") -> None:
         """Spin until ``predicate``; AssertionError after ``timeout`` s."""
@@ -195,7 +202,11 @@ class Probe:
 
     def begin(self, service: str, within: float = 30.0) -> Any:
         """Future of a Trigger request."""
-        client = self.node.create_client(Trigger, service)
+        client = self._clients.get(service)
+        if client is None:
+            client = self._clients[service] = self.node.create_client(Trigger, service)
+            self.spin_until(client.service_is_ready, within, f"service {service}")
+            self.spin_for(ACQUAINTED)
         self.spin_until(client.service_is_ready, within, f"service {service}")
         return client.call_async(Trigger.Request())
 

@@ -52,7 +52,11 @@ def test_simulate_writes_a_session_with_its_truth(tmp_path: Path, capsys: pytest
     out = tmp_path / "car"
     options = ("--start", "pulled", "--shake", "0.05", "0.7", "--storage", "sqlite3", "--compression", "file")
     assert simulate(out, "--case", "14", "--seed", "3", *options) == 0
-    assert capsys.readouterr().out == f"session: {out}\n"
+    *modes, last = capsys.readouterr().out.splitlines()
+    assert last == f"session: {out}"
+    # A simulator of other make swings at 0.95 and 1.33 Hz
+    frequencies = [float(line.removeprefix("swings at ").split(" Hz")[0]) for line in modes]
+    assert frequencies == pytest.approx([0.95, 1.33], abs=0.005)
     session = read_session(out)
     assert [r.kind for r in session.recordings] == ["static", "static", "dynamic", "dynamic"]
     assert session.recordings[2].exciter_shaft is not None
@@ -60,6 +64,28 @@ def test_simulate_writes_a_session_with_its_truth(tmp_path: Path, capsys: pytest
     assert truth["inertia"][1][2] == 70.0
     length = truth["parameters"]["cable_1.length"]
     assert 0.0 < abs(length["value"] - length["described"]) < 0.0015
+
+
+def test_the_motor_pulls_with_its_mass_radius_and_speed(tmp_path: Path) -> None:
+    out = tmp_path / "shaken"
+    options = (
+        "--start",
+        "rest",
+        "--motor",
+        "12",
+        "0.25",
+        "0.9",
+        "--plane",
+        "xz",
+        "--no-noise",
+        "--no-doubts",
+    )
+    assert simulate(out, "--case", "1", *options) == 0
+    force = read_session(out).training[0].exciter_force
+    assert force is not None
+    full = force.values[force.time > 3.5]
+    np.testing.assert_allclose(np.linalg.norm(full, axis=1), 12 * 0.25 * (2.0 * np.pi * 0.9) ** 2, rtol=1e-3)
+    np.testing.assert_allclose(full[:, 1], 0.0, atol=1e-9)
 
 
 def test_simulate_on_a_described_rig_with_motion_capture_alone(tmp_path: Path) -> None:
@@ -101,6 +127,7 @@ def test_simulate_overwrites_when_told_to(tmp_path: Path, capsys: pytest.Capture
         (["--rig", str(CONFIG / "bifilar.yaml"), "--body", *BAR], "noise.tension: missing"),
         (["--rig", "absent.yaml", "--body", *PLATE], "absent.yaml"),
         (["--case", "14", "--shake", "0", "1"], "--shake 0 1"),
+        (["--case", "14", "--motor", "12", "0", "1"], "--motor 12 0 1"),
         (["--case", "14", "--seed", "-1"], "--seed -1"),
         (["--case", "14", "--duration", "0.5"], "--duration 0.5"),
         (["--case", "14", "--mocap", "nan"], "--mocap nan"),

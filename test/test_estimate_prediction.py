@@ -250,3 +250,15 @@ def test_a_cut_run_is_the_same_run() -> None:
     rows = other.plain.size
     # The last nodes' interpolation and input reach past the cut
     np.testing.assert_allclose(other.plain[: rows - 60], one.plain[: rows - 60], atol=1e-3)
+
+
+def test_a_piece_moves_as_the_run_does_from_its_first_node_to_its_last() -> None:
+    session, truth = recorded(random_sample(2, 3), duration=3.0)
+    problem, _, _ = pose_problem(session)
+    run, theta = prepare(session.rig, session.training[0]), vector_of(problem, truth)
+    first, last = run.grid.nodes // 3, 2 * run.grid.nodes // 3
+    whole = linearise_run(problem.bench, run, theta, truth.starts["run_1"])
+    assert whole is not None
+    piece = linearise_run(problem.bench, run.between(first, last), theta, whole.motion.state(first))
+    assert piece is not None
+    np.testing.assert_allclose(piece.motion.outputs, whole.motion.outputs[first : last + 1], atol=1e-6)

@@ -18,7 +18,12 @@ from rig_identification.mismatch.latent import MissingWrench, joined, strongest_
 from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import DAMPING, FREQUENCIES, travels
-from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, largest_compliance
+from rig_identification.mismatch.supports import (
+    cable_elasticity,
+    ceiling_candidate,
+    largest_compliance,
+    usual_stiffness,
+)
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import State
@@ -106,10 +111,10 @@ def test_supports_change_the_model_and_nothing_else() -> None:
     assert ceiling.internal == 1
     assert {p.name.split(".")[1] for p in parameters} == {"compliance", "frequency", "damping_ratio"}
     assert ceiling.physics[place.internal_block(4, 0) + layout.AXIS + 2] == 1.0
-    elastic, shared = cable_elasticity(sample.rig, model, 1200.0, 5e6).built(model)
+    elastic, shared = cable_elasticity(sample.rig, model, 1200.0).built(model)
     assert np.all(elastic.modes == layout.ELASTIC)
     assert len(shared[0].also) == 3
-    assert shared[0].value(0.0) == pytest.approx(5e6)
+    assert shared[0].value(0.0) == pytest.approx(usual_stiffness(sample.rig, 1200.0))
     assert shared[0].position(shared[0].value(0.7)) == pytest.approx(0.7)
     # A centimetre under the body's weight
     assert largest_compliance(sample.rig, 1200.0) * 1200.0 * sample.rig.gravity == pytest.approx(0.01)

@@ -10,7 +10,7 @@ from test_estimate_prediction import recorded
 from test_model_rigs import random_sample
 
 from rig_identification.estimate.evidence import Run, prepare
-from rig_identification.mismatch.slack import slack_finding, slack_spells, taut_stretches
+from rig_identification.mismatch.slack import Spell, shocks, slack_finding, slack_spells, taut_stretches
 
 
 @pytest.fixture(scope="module")
@@ -52,3 +52,24 @@ def test_a_spell_is_found_and_cut_out(run: Run) -> None:
 def test_a_glitch_is_no_spell(run: Run) -> None:
     step = float(np.median(np.diff(run.channels[0].time)))
     assert slack_spells(_with_nothing(run, 3.0, 3.0 + 1.5 * step), 3.0) == []
+
+
+def test_a_snap_between_two_samples_is_a_shock(run: Run) -> None:
+    assert shocks(run) == []
+    channels = list(run.channels)
+    c = channels[0]
+    values, at = c.values.copy(), int(np.searchsorted(c.time, 5.0))
+    values[at] += 300.0
+    channels[0] = replace(c, values=values)
+    (shock,) = shocks(replace(run, channels=tuple(channels)))
+    assert shock.cable == c.device
+    assert shock.start <= c.time[at] <= shock.end < shock.start + 0.2
+
+
+def test_spells_of_several_cables_at_once_are_told_once() -> None:
+    one, other = Spell("cable_1", "run_1", 3.0, 3.4), Spell("cable_2", "run_1", 3.3, 3.7)
+    finding = slack_finding([other, one, Spell("cable_1", "run_2", 3.0, 3.1)])
+    assert finding.where["times"] == [
+        {"recording": "run_1", "start": 3.0, "end": 3.7},
+        {"recording": "run_2", "start": 3.0, "end": 3.1},
+    ]

@@ -25,6 +25,9 @@ NODES = (
     "rig_simulator", "load_cells", "imu", "inclinometer", "tracker", "preprocessor", "identifier", "recorder",
 )  # fmt: skip
 
+#: s that every listener gets to be met by discovery: seconds on a busy machine.
+DISCOVERY = 4.0
+
 
 class Diagnostics:
     """The latest line of each name on /diagnostics."""
@@ -78,6 +81,22 @@ def test_a_signal_while_starting_ends_every_node_quietly(graph: Graph, number: i
         assert (name, *graph.end(process, number)) == (name, 0, "")
 
 
+@pytest.mark.parametrize("name", ["rig_simulator", "tracker"])
+def test_a_signal_during_the_first_start_after_installation_is_heeded_at_once(
+    graph: Graph, name: str
+) -> None:
+    """Nothing lies compiled yet: compiling takes minutes, and longer than launch waits before it kills."""
+    compiled = graph.folder / "compiled"
+    process = graph.start(name, NUMBA_CACHE_DIR=str(compiled))
+    end = time.monotonic() + 180.0
+    while not list(compiled.rglob("*.nbi")):
+        assert time.monotonic() < end, "nothing is compiled"
+        time.sleep(0.05)
+    status, output = graph.end(process, within=5.0)
+    assert status == 0
+    assert output in ("", f"{name}: compiles its machine code, once after installation: some minutes\n")
+
+
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_recording_leaves_the_recording_whole(
@@ -90,6 +109,7 @@ def test_a_signal_while_recording_leaves_the_recording_whole(
     assert probe.call("recorder/start").success
     count = len(heard)
     probe.spin_until(lambda: len(heard) > count + 200, 30.0, "two seconds of data")
+    probe.spin_for(DISCOVERY)
     recorder.send_signal(number)
     recorder.send_signal(number)  # an impatient operator
     assert graph.end(recorder, number) == (0, "")
@@ -97,6 +117,47 @@ def test_a_signal_while_recording_leaves_the_recording_whole(
     quality = {q.topic: q for q in run.quality}
     assert quality["/rig/cable_1/wrench"].used > 150
     assert quality["/rig/cable_1/wrench"].missing == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_data_flows_ends_every_node_and_keeps_the_open_window(
+    graph: Graph, probe: Probe, number: int
+) -> None:
+    """All eight nodes at work, a recording and a window open: all end quietly, both are whole."""
+    folder, spool = graph.folder / "session", graph.folder / "windows"
+    processes = simulated(graph, "inclinometer", "tracker", "preprocessor")
+    processes["identifier"] = graph.start("identifier", f"spool:={spool}")
+    processes["recorder"] = graph.start("recorder", f"folder:={folder}", "record_at_start:=true")
+    wrenches = probe.listen(WrenchStamped, "generalized_wrench")
+    assert probe.call("identifier/start_window").success
+    probe.spin_until(lambda: len(wrenches) > 100, 120.0, "a graph at work")
+    probe.spin_for(DISCOVERY)  # for more than the second that a dynamic run has to last
+    for process in processes.values():
+        process.send_signal(number)
+    for name, process in processes.items():
+        assert (name, *graph.end(process, number)) == (name, 0, "")
+    for written in (folder, spool):
+        (run,) = read_session(written).recordings
+        quality = {q.topic: q for q in run.quality}
+        assert quality["/rig/cable_1/wrench"].used > 50
+        assert quality["/rig/cable_1/wrench"].missing == 0
+        assert run.imu is not None
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_replaying_ends_the_replay(graph: Graph, probe: Probe, number: int) -> None:
+    folder = graph.folder / "session"
+    processes = simulated(graph)
+    recorder = graph.start("recorder", f"folder:={folder}", "record_at_start:=true")
+    heard = probe.listen(WrenchStamped, "cable_1/wrench")
+    probe.spin_until(lambda: len(heard) > 800, 120.0, "eight seconds of data")
+    for process in (*processes.values(), recorder):
+        assert graph.end(process) == (0, "")
+    replay = graph.start("replay", f"session:={folder}", "rate:=0.5")
+    count = len(heard)
+    probe.spin_until(lambda: len(heard) > count + 20, 60.0, "the replay")
+    assert replay.poll() is None
+    assert graph.end(replay, number) == (0, "")
 
 
 def test_a_signal_while_fitting_ends_fit_and_node(graph: Graph, probe: Probe) -> None:
@@ -119,24 +180,29 @@ def test_a_sensor_killed_and_restarted_leaves_a_gap_with_a_name(graph: Graph, pr
     nodes = simulated(graph)
     folder = graph.folder / "session"
     recorder = graph.start("recorder", f"folder:={folder}")
+    identifier = graph.start("identifier", f"spool:={graph.folder / 'windows'}")
     diagnostics = Diagnostics(probe)
     heard = probe.listen(Imu, "imu/data_raw")
     probe.spin_until(lambda: len(heard) > 50, 120.0, "the imu")
     assert probe.call("recorder/start").success
-    probe.spin_for(1.0)
+    assert probe.call("identifier/start_window").success
+    probe.spin_for(DISCOVERY)
     nodes["imu"].kill()
     line = "recorder: /rig/imu/data_raw"
     probe.spin_until(lambda: diagnostics.says(line, "silent"), 10.0, "the word of silence")
     count = len(heard)
     graph.start("imu", "simulation.rate:=100.0")
-    probe.spin_until(lambda: len(heard) > count + 100, 20.0, "the imu again")
+    probe.spin_until(lambda: len(heard) > count + 400, 40.0, "the imu again")
     answer = probe.call("recorder/stop")
     assert answer.success, answer.message
-    quality = {q.topic: q for q in read_session(folder).recordings[0].quality}
-    assert quality["/rig/imu/data_raw"].gaps == 1
-    assert quality["/rig/imu/data_raw"].longest_gap > 1.0
-    assert quality["/rig/cable_1/wrench"].missing == 0
+    assert probe.call("identifier/stop_window").success
+    for written in (folder, graph.folder / "windows"):
+        quality = {q.topic: q for q in read_session(written).recordings[0].quality}
+        assert quality["/rig/imu/data_raw"].gaps == 1
+        assert quality["/rig/imu/data_raw"].longest_gap > 1.0
+        assert quality["/rig/cable_1/wrench"].missing == 0
     assert graph.end(recorder) == (0, "")
+    assert graph.end(identifier) == (0, "")
 
 
 def test_a_node_started_twice_and_one_started_late_are_named(graph: Graph, probe: Probe) -> None:
@@ -161,7 +227,12 @@ def test_a_clock_that_was_never_set_is_said(graph: Graph, probe: Probe) -> None:
     diagnostics = Diagnostics(probe)
     line = "recorder: /rig/imu/data_raw"
     probe.spin_until(lambda: diagnostics.says(line, "s off the other devices'"), 40.0, "the word")
-    assert float(diagnostics.value(line, "clock_difference")) == pytest.approx(5.0, abs=0.1)
+
+    def told() -> bool:
+        # On a busy machine a batch arrives late, and late by as much is what its clock then seems
+        return float(diagnostics.value(line, "clock_difference")) == pytest.approx(5.0, abs=0.1)
+
+    probe.spin_until(told, 20.0, "a difference of 5 s")
     assert diagnostics.lines["recorder: /rig/cable_1/wrench"].level == DiagnosticStatus.OK
     assert graph.end(recorder) == (0, "")
 

@@ -193,7 +193,9 @@ def test_a_wrong_description_is_answered_with_a_finding(recorded: Path, tmp_path
         (finding,) = mismatch["findings"]
         assert finding["effect"] == "imu_position"
         error = next(iter(finding["parameters"].values()))
-        assert abs(abs(error["value"]) - 0.05) < 0.005
+        # A short live recording, another one each time: what it is off by, its own interval has to hold
+        assert error["std"] < 0.01
+        assert abs(abs(error["value"]) - 0.05) < 3.0 * error["std"]
         probe.spin_until(lambda: told, 10.0, "the latched findings")
         assert [line.name for line in told[-1].status] == ["mismatch", "mismatch: imu_position"]
         assert graph.end(identifier) == (0, "")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig_identification.cli.effects import effect_of, effects_document, effects_given
 from rig_identification.errors import InputError
 from rig_identification.model.body import tensor
 from rig_identification.recording import Dummy, Recording, Session
@@ -288,3 +289,77 @@ def test_the_example_rigs_hang_and_swing(name: str, elements: list[float]) -> No
     session, truth = simulate_session(spec, np.random.default_rng(2))
     assert truth.least_tension["run"] > 0.1 * body[0] * rig.gravity / len(rig.cables)
     assert np.max(np.ptp(session.training[0].ground_truth.values[:, :3], axis=0)) > 0.005
+
+
+def test_effects_are_those_of_the_simulated_plant() -> None:
+    """A push on a body at rest is felt at its time; a part on springs adds no weight but rings afterwards."""
+    center = tuple(CAR.center_of_mass)
+    push = {
+        "external_force.peak_force": (2000.0,),
+        "external_force.start": (1.0,),
+        "external_force.duration": (0.05,),
+        "external_force.position": center,
+    }
+    part = {
+        "sprung_mass.mass": (0.05 * CAR.mass,),
+        "sprung_mass.frequency": (8.0,),
+        "sprung_mass.damping_ratio": (0.01,),
+        "sprung_mass.position": center,
+    }
+    run = RunSpec("run_1", 4.0, AtRest())
+    ringing = []
+    for effects in (push, push | part):
+        imu = recorded(car(run, effects=effects)).imu
+        assert imu is not None
+        force = imu.values[:, 3]
+        assert np.ptp(force[imu.time < 0.97]) < 1e-6
+        assert np.ptp(force[(imu.time > 0.97) & (imu.time < 1.1)]) > 0.3
+        after = force[imu.time > 1.2]
+        spectrum = np.abs(np.fft.rfft((after - np.mean(after)) * np.hanning(after.size)))
+        frequency = np.fft.rfftfreq(after.size, 1.0 / RATES.imu)
+        ringing.append(np.max(spectrum[(frequency > 6.0) & (frequency < 11.0)]))
+    assert ringing[1] > 3.0 * ringing[0]
+    still = [
+        simulate_session(car(effects=effects), np.random.default_rng(0))[0].statics[0]
+        for effects in ({}, part)
+    ]
+    for cable in still[0].tension:
+        assert still[1].tension[cable].values == pytest.approx(still[0].tension[cable].values, abs=1e-3)
+
+
+def test_a_devices_error_is_on_top_of_what_it_reads() -> None:
+    run = RunSpec("run_1", 2.0, PULL)
+    plain = recorded(car(run))
+    wrong = recorded(car(run, effects={"imu.gyroscope_bias.x": (0.01,), "cable_2.load_cell_gain": (0.02,)}))
+    assert wrong.imu.values[:, 0] == pytest.approx(plain.imu.values[:, 0] + 0.01, abs=1e-9)
+    assert wrong.imu.values[:, 1:] == pytest.approx(plain.imu.values[:, 1:], abs=1e-9)
+    assert wrong.tension["cable_2"].values == pytest.approx(1.02 * plain.tension["cable_2"].values)
+    assert wrong.tension["cable_1"].values == pytest.approx(plain.tension["cable_1"].values)
+
+
+def test_cables_that_stretch_start_where_they_hang() -> None:
+    """Let go aside on elastic cables the body swings; it does not bounce by all of its stretch."""
+    run = RunSpec("run_1", 2.0, PULL)
+    stiff, soft = (recorded(car(run, effects=effects)) for effects in ({}, {"cable_elasticity": (2e6,)}))
+    for cable, series in soft.tension.items():
+        beside = np.ptp(series.values[:40] - np.mean(stiff.tension[cable].values[:40]))
+        assert beside < 0.5 * np.mean(series.values)
+
+
+def test_an_effect_that_is_unknown_is_refused() -> None:
+    with pytest.raises(InputError, match=r"effect hinge_dampin: is unknown; known are .*hinge_damping"):
+        recorded(car(RunSpec("run_1", 2.0), effects={"hinge_dampin": (1.0,)}))
+
+
+def test_effects_of_the_command_line_are_told_in_the_contracts_words() -> None:
+    given = effects_given(
+        ["tether=100,0,0", "tether_point=0,0,1", "imu.orientation.x=0.01", "imu.clock=1e-3"]
+    )
+    assert given["tether"] == (100.0, 0.0, 0.0)
+    told = {entry["effect"]: entry["switches"] for entry in effects_document(given)}
+    assert set(told) == {"tether", "imu_misalignment", "clock_offset"}
+    assert told["tether"] == {"tether": [100.0, 0.0, 0.0], "tether_point": [0.0, 0.0, 1.0]}
+    assert effect_of("sprung_mass.position") == "sprung_mass"
+    assert effect_of("imu.position.y") == "imu_position"
+    with pytest.raises(InputError, match="--effect hinge_damping: give NAME=VALUE"):
+        effects_given(["hinge_damping"])

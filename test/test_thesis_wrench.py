@@ -110,3 +110,19 @@ def test_all_sources_add_in_squares(hung):
     total = np.sqrt(np.sum(np.square(list(found.by_source.values())), axis=0))
     assert found.std == pytest.approx(total)
     assert np.all(found.std > 0.0)
+
+
+def test_a_weight_turns_with_a_wrong_tilt_and_is_doubted_along_the_vertical(hung):
+    """Against wrenches recomputed on tilted poses and with another weight."""
+    case, rig, pose, up, tension, force = hung
+    center, weight = case.center_of_mass, 2500.0
+    doubts = np.zeros(3), weight, 3.0
+    found = wrench_uncertainty(rig, pose, tension, force, center, *doubts).by_source
+
+    def wrench(at, weight=weight):
+        return generalized_wrench(rig, at[None], tension[None], force[None], center, weight)[0]
+
+    slopes = [(wrench(pose_on(rig, pose, up + SIZE * e)) - wrench(pose)) / SIZE for e in np.eye(2)]
+    expected = np.sqrt(sum((slope * np.hypot(3e-4, 3e-4)) ** 2 for slope in slopes))
+    assert found["inclination"] == pytest.approx(expected, rel=1e-3)
+    assert found["weight"] == pytest.approx(np.abs(wrench(pose, weight + 3.0) - wrench(pose)), abs=1e-9)

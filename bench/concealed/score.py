@@ -114,6 +114,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--digests", type=Path, default=DIGESTS, help="committed file with the sealed file's SHA-256"
     )
     parser.add_argument("--reasons", type=Path, default=None, help="JSON of session: reason of its miss")
+    parser.add_argument(
+        "--first",
+        type=int,
+        default=None,
+        help="score so many, by seed: where time ended the examination",
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder for concealed.json and concealed.md")
     options = parser.parse_args(arguments)
     try:
@@ -122,6 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             digest, truths = open_sealed(options.truths, options.digests)
         reasons = json.loads(options.reasons.read_text(encoding="utf-8")) if options.reasons else {}
+        truths = truths[: options.first]
         marks = score(truths, options.sessions, options.results, reasons, sealed=digest is not None)
     except (InputError, OSError) as error:
         print(f"score: {error}", file=sys.stderr)

@@ -9,9 +9,12 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import multiprocessing
 import secrets
+import shutil
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -49,31 +52,52 @@ def _in_turn(rng: np.random.Generator, names: list[str], count: int) -> list[str
     return chosen[:count]
 
 
+def _made(entry: dict[str, Any], duration: float, sessions: Path | None) -> dict[str, Any]:
+    """One session, written to ``sessions``; its entry with its truth."""
+    try:
+        session, truth = make_session(
+            entry["seed"], kind=entry["kind"], size=entry["size"], duration=duration
+        )
+    except RuntimeError as error:  # this body with this effect cannot be run: one session less
+        return {**entry, "duration": duration, "truth": None, "failed": str(error)}
+    if sessions is not None:
+        from rig_identification.session import write_session
+
+        shutil.rmtree(sessions / session.name, ignore_errors=True)
+        write_session(session, sessions / session.name)
+    return {**entry, "duration": duration, "truth": truth}
+
+
 def seal(
-    seeds: Sequence[int], path: Path, salt: str, duration: float = 32.0, sessions: Path | None = None
+    seeds: Sequence[int],
+    path: Path,
+    salt: str,
+    duration: float = 32.0,
+    sessions: Path | None = None,
+    jobs: int = 1,
 ) -> str:
     """Write the truths of all sessions to ``path``; return its SHA-256 in hex.
 
     ``sessions``: a folder to write the sessions themselves to, each without its truth. One that the
-    engine cannot make is left out; its entry says why.
+    engine cannot make is left out; its entry says why. What is finished stands in ``path`` at any time: an
+    interrupted sealing goes on from there, with the salt that it began with.
     """
-    entries = []
-    for k, entry in enumerate(compose(seeds, salt)):
-        try:
-            session, truth = make_session(
-                entry["seed"], kind=entry["kind"], size=entry["size"], duration=duration
+    done: dict[int, dict[str, Any]] = {}
+    if path.exists():
+        begun = json.loads(path.read_text())
+        salt, done = begun["salt"], {entry["seed"]: entry for entry in begun["sessions"]}
+    wanted = [entry for entry in compose(seeds, salt) if entry["seed"] not in done]
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(_made, entry, duration, sessions) for entry in wanted]):
+            entry = future.result()
+            done[entry["seed"]] = entry
+            told = "left out" if entry["truth"] is None else "made"
+            print(f"{len(done)} of {len(seeds)}: seed {entry['seed']} {told}", file=sys.stderr)
+            aside = path.with_suffix(".part")
+            aside.write_text(
+                json.dumps({"salt": salt, "sessions": [done[k] for k in sorted(done)]}, indent=1)
             )
-        except RuntimeError as error:  # this body with this effect cannot be run: one session less
-            entries.append({**entry, "duration": duration, "truth": None, "failed": str(error)})
-            print(f"{k + 1} of {len(seeds)}: left out", file=sys.stderr)
-            continue
-        entries.append({**entry, "duration": duration, "truth": truth})
-        if sessions is not None:
-            from rig_identification.session import write_session
-
-            write_session(session, sessions / session.name)
-        print(f"{k + 1} of {len(seeds)}: {session.name}", file=sys.stderr)
-    path.write_text(json.dumps({"salt": salt, "sessions": entries}, indent=1))
+            aside.replace(path)
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -85,11 +109,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--duration", type=float, default=32.0, help="of each run, s")
     parser.add_argument("--salt", default=None, help="default: drawn; give one to repeat a sealing")
     parser.add_argument("--sessions", type=Path, default=None, help="folder to write the sessions to")
+    parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args(arguments)
     seeds = range(options.first_seed, options.first_seed + options.count)
     digest = seal(
-        seeds, options.out, options.salt or secrets.token_hex(16), options.duration, options.sessions
+        seeds,
+        options.out,
+        options.salt or secrets.token_hex(16),
+        options.duration,
+        options.sessions,
+        options.jobs,
     )
     print(f"seeds {seeds[0]} to {seeds[-1]}: SHA-256 {digest}")
     return 0

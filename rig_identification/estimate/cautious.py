@@ -26,9 +26,12 @@ ROUNDS = 4
 STEPS = 4
 
 
-def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[tuple[str, str, int], float]:
-    """Factor on the noise of each (device, quantity, axis): root of the residual's power where motion is."""
-    power: dict[tuple[str, str, int], list[Array]] = {}
+Axis = tuple[str, str, int]  # device, quantity, axis
+
+
+def _powers(problem: Problem, evaluation: Evaluation) -> dict[Axis, list[Array]]:
+    """Power of the whitened residual of each axis and run, at the frequencies of the motion."""
+    power: dict[Axis, list[Array]] = {}
     for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
         for index, channel in enumerate(run.channels):
             for axis in range(channel.width):
@@ -39,7 +42,27 @@ def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[tuple[str, 
                 ordinates = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
                 inside = np.arange(ordinates.size) * rate / rows.size <= MOTION_BAND
                 power.setdefault((channel.device, channel.quantity, axis), []).append(ordinates[inside])
+    return power
+
+
+def band_inflation(problem: Problem, evaluation: Evaluation) -> dict[Axis, float]:
+    """Factor on the noise of each axis: root of the residual's power where motion is."""
+    power = _powers(problem, evaluation)
     return {key: float(np.sqrt(max(1.0, float(np.mean(np.concatenate(v)))))) for key, v in power.items()}
+
+
+def coherence(problem: Problem, evaluation: Evaluation) -> float:
+    """How much louder than on average over the motion's frequencies what is left is at its loudest one.
+
+    The largest such ratio of any axis; white residuals have about 1. An error that follows the motion lies at
+    the motion's own frequency, and there it counts as one error, not as many small ones.
+    """
+    ratios = [1.0]
+    for parts in _powers(problem, evaluation).values():
+        size = max(part.size for part in parts)
+        mean = np.mean([part for part in parts if part.size == size], axis=0)
+        ratios.append(float(np.max(mean) / max(1.0, np.mean(mean))))
+    return max(ratios)
 
 
 def reweighted(problem: Problem, evaluation: Evaluation) -> Problem:

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.estimate.sampling import Grid, group_by_node, sample_noise_std
+from rig_identification.estimate.sampling import (
+    Grid,
+    NodeInput,
+    Sampler,
+    cubic_error,
+    group_by_node,
+    node_input,
+    sample_noise_std,
+)
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-#: Node spacing of runs up to LONG_RUN seconds, and of longer ones.
+#: Node spacing of runs up to LONG_RUN seconds that hold fast motion (snaps, bounces, steps of force); of
+#: longer ones, and of all whose samples a cubic through wider nodes follows.
 NODE_STEP = 0.005
-LONG_NODE_STEP = 0.01
+WIDE_NODE_STEP = 0.01
 LONG_RUN = 150.0
+#: Root mean square error of that cubic, in units of one sample's noise, up to which it follows.
+FOLLOWED = 0.1
 #: Node spacing where a run is only watched: no device follows more than the swing itself, whose pose a
 #: cubic through such nodes holds to 1e-4 at 1.5 Hz.
 WATCHED_NODE_STEP = 0.025
@@ -46,13 +58,25 @@ class Channel:
         """Number of axes."""
         return int(self.values.shape[1])
 
-    @property
+    @cached_property
+    def in_order(self) -> bool:
+        """Whether no sample lies before the one before it."""
+        return bool(np.all(np.diff(self.time) >= 0.0))
+
+    def about(self, start: float, end: float) -> slice:
+        """A few samples more than those from ``start`` to ``end`` s."""
+        if not self.in_order:
+            return slice(None)
+        first, last = np.searchsorted(self.time, [start, end])
+        return slice(max(0, int(first) - 1), int(last) + 2)
+
+    @cached_property
     def grouped(self) -> Array:
         """(groups, w) mean of each group."""
         count = np.bincount(self.group)
         return np.stack([np.bincount(self.group, v) / count for v in self.values.T], axis=1)
 
-    @property
+    @cached_property
     def grouped_variance(self) -> Array:
         """(groups, w) variance of each group's mean."""
         return np.asarray(self.noise**2 / np.bincount(self.group)[:, None])
@@ -65,11 +89,16 @@ class Run:
     recording: Recording
     grid: Grid
     channels: tuple[Channel, ...]
-    exciter: Series | None
+    force: NodeInput | None  # measured exciter force at the nodes, exciter frame, N
     exciter_noise: float  # N, one sample
     exciter_rate: float  # Hz
     R_tracker_mean: Array | None = None  # (3, 3) see sensors.mocap
     offset: float = 0.0  # s after the recording's start at which node 0 lies
+
+    @cached_property
+    def samplers(self) -> tuple[Sampler, ...]:
+        """How each channel samples what the nodes hold."""
+        return tuple(Sampler(self.grid, c.time, c.group, c.node.size) for c in self.channels)
 
     def until(self, end: float) -> Run:
         """The same run, cut off at ``end`` seconds."""
@@ -82,22 +111,17 @@ class Run:
         shift = first * self.grid.step
         cut = []
         for channel in self.channels:
-            time = channel.time - shift
+            near = channel.about(shift, shift + grid.duration)
+            time = channel.time[near] - shift
             inside = (time >= 0.0) & (time <= grid.duration - margin)
             if not np.any(inside):
                 continue
             group, node = group_by_node(grid, time[inside])
-            cut.append(
-                replace(channel, time=time[inside], values=channel.values[inside], group=group, node=node)
-            )
-        exciter = self.exciter
-        if exciter is not None:
-            # Two extra intervals on either side, so that the input's spline feels no edge
-            near = (exciter.time >= shift - 2 * grid.step) & (
-                exciter.time <= shift + grid.duration + 2 * grid.step
-            )
-            exciter = Series(exciter.time[near] - shift, exciter.values[near]) if np.any(near) else None
-        return replace(self, grid=grid, channels=tuple(cut), exciter=exciter, offset=self.offset + shift)
+            values = channel.values[near][inside]
+            cut.append(replace(channel, time=time[inside], values=values, group=group, node=node))
+        # The input is cut, not made anew: at an edge a spline knows half as much
+        force = None if self.force is None else self.force.between(first, last)
+        return replace(self, grid=grid, channels=tuple(cut), force=force, offset=self.offset + shift)
 
 
 def noise_std(rig: Rig, name: str, time: Array, values: Array) -> tuple[Array, bool]:
@@ -128,17 +152,32 @@ def _mocap_series(series: Series) -> tuple[Series, Array]:
     return Series(series.time, np.concatenate([series.values[:, :3], about_mean], axis=1)), mean.as_matrix()
 
 
-def node_step(recording: Recording) -> float:
+def node_step(rig: Rig, recording: Recording) -> float:
     """Node spacing (s) that a recording's fastest device needs."""
     fast = (recording.imu, recording.exciter_force, recording.inclination)
     if not recording.tension and all(series is None for series in fast):
         return WATCHED_NODE_STEP
-    return NODE_STEP if recording.duration <= LONG_RUN else LONG_NODE_STEP
+    if recording.duration > LONG_RUN:
+        return WIDE_NODE_STEP
+    follows = [_follows(rig, "tension", series) for series in recording.tension.values()]
+    if recording.imu is not None:
+        time, values = recording.imu.time, recording.imu.values
+        follows.append(_follows(rig, "angular_rate", Series(time, values[:, :3])))
+        follows.append(_follows(rig, "specific_force", Series(time, values[:, 3:])))
+    return WIDE_NODE_STEP if all(follows) else NODE_STEP
 
 
-def prepare(rig: Rig, recording: Recording) -> Run:
-    """Everything of a dynamic recording that a fit needs."""
-    step = node_step(recording)
+def _follows(rig: Rig, name: str, series: Series) -> bool:
+    """Whether a cubic through nodes WIDE_NODE_STEP apart follows samples to a part of their noise."""
+    if series.time.size < 16:
+        return True
+    noise, _ = noise_std(rig, name, series.time, series.values)
+    return bool(np.all(cubic_error(series.time, series.values, noise, WIDE_NODE_STEP) < FOLLOWED * noise))
+
+
+def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
+    """Everything of a dynamic recording that a fit needs. step: between nodes, s (none: what it takes)."""
+    step = step or node_step(rig, recording)
     grid = Grid(step, int(np.floor(recording.duration / step)) + 1)
     found: list[Channel | None] = []
     for cable, series in recording.tension.items():
@@ -164,11 +203,10 @@ def prepare(rig: Rig, recording: Recording) -> Run:
             _channel(rig, grid, "mocap", "orientation", "rad", "mocap_orientation", turn, slice(3, 6))
         )
     exciter = recording.exciter_force if rig.exciter is not None else None
-    noise, rate = 0.0, 1.0
+    noise, rate, force = 0.0, 1.0, None
     if exciter is not None and exciter.time.size > 8:
         std, _ = noise_std(rig, "exciter_force", exciter.time, exciter.values)
         noise = float(np.sqrt(np.mean(std**2)))
         rate = 1.0 / float(np.median(np.diff(exciter.time)))
-    else:
-        exciter = None
-    return Run(recording, grid, tuple(c for c in found if c is not None), exciter, noise, rate, mean)
+        force = node_input(grid, exciter.time, exciter.values, noise)
+    return Run(recording, grid, tuple(c for c in found if c is not None), force, noise, rate, mean)

@@ -39,8 +39,8 @@ HOLD = 0.1
 HOPELESS_SQUARE = 2.0
 #: Mean square residual below which what a fit lacks is so small that first order tells it.
 NEAR_SQUARE = 1.3
-#: Steps of the whole run's fit.
-STEPS = 20
+#: Steps of the whole run's fit; fewer where a shorter horizon was hopeless: they only say how far off it is.
+STEPS, HOPELESS_STEPS = 20, 5
 
 
 def misfit(evaluation: Evaluation) -> float:
@@ -56,6 +56,13 @@ def horizons(duration: float) -> list[float]:
         ends.append(end)
         end *= GROWTH
     return [*ends, duration]
+
+
+def held_over(problem: Problem, end: float, center: Array) -> Problem:
+    """The first ``end`` s of every run, with the body held near ``center`` (the body's part of a vector)."""
+    return replace(
+        shortened(problem, end), weak_center=center, weak=HOLD * problem.weak, stride=problem.stride / HOLD
+    )
 
 
 def _at(notify: Callable[[float, str], None], end: float, duration: float) -> Callable[[int, float], None]:
@@ -75,33 +82,34 @@ def solve_growing(
     duration = max((run.grid.duration for run in problem.runs), default=0.0)
     ends = horizons(duration) if problem.runs else [0.0]
     guess = point.theta[:INERTIAL].copy()
-    polish = 0.0
+    hopeless = False
     for i, end in enumerate(ends):
         whole = i == len(ends) - 1
         part = problem
         if not whole:
             # A short horizon must not throw away what the guess knows: the body stays near it
-            part = replace(
-                shortened(problem, end),
-                weak_center=guess,
-                weak=HOLD * problem.weak,
-                stride=problem.stride / HOLD,
-            )
+            part = held_over(problem, end, guess)
         # The start states alone first: their error is the largest, and everything else would bend to it
         point = replace(point, starts=settled_starts(part, point))
         # A short horizon needs no polish: the next one moves everything again
         evaluation, converged = solve(
             part,
             point,
-            iterations=STEPS if whole else 12,
-            polish=polish,
+            iterations=12 if not whole else HOPELESS_STEPS if hopeless else STEPS,
+            # Bites only where much stays unexplained; a short hopeless horizon still says where to go
+            polish=POLISH if whole or hopeless else 0.0,
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else _at(notify, end, duration),
         )
+        if whole and hopeless and not converged and misfit(evaluation) < HOPELESS_SQUARE:
+            # It was the short horizon that was stuck, not the model that lacks something
+            evaluation, converged = solve(
+                part, evaluation.point, iterations=STEPS, polish=POLISH, tolerance=1e-3
+            )
         point = evaluation.point
         if misfit(evaluation) > HOPELESS_SQUARE:
             # What a few seconds cannot fit, the whole run hardly can: no valley is worth following far
-            polish = POLISH
+            hopeless = True
     return evaluation, converged
 
 
@@ -109,7 +117,7 @@ def settled_starts(problem: Problem, point: Point) -> tuple[State, ...]:
     """Start states that fit best with everything else as it is at ``point``."""
     starts = []
     for run, start in zip(problem.runs, point.starts, strict=True):
-        found = fit_start(problem.bench, run, point.theta, start, tolerance=0.1)
+        found = fit_start(problem.bench, run, point.theta, start, tolerance=0.1, polish=POLISH)
         starts.append(start if found is None else found[1])
     return tuple(starts)
 
@@ -120,7 +128,12 @@ def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tup
     for end in horizons(run.grid.duration):
         whole = end >= run.grid.duration
         result = fit_start(
-            bench, run if whole else run.until(end), theta, start, tolerance=1e-3 if whole else 0.5
+            bench,
+            run if whole else run.until(end),
+            theta,
+            start,
+            tolerance=1e-3 if whole else 0.5,
+            polish=POLISH,
         )
         if result is None:
             return None

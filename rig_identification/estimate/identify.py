@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
-from rig_identification.estimate.cautious import solve_cautiously
+from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.first_guess import first_elements, weak_prior
@@ -32,12 +32,15 @@ from rig_identification.estimate.solve import Evaluation, Point, Problem, evalua
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import subtract_frame
-from rig_identification.model.motion import State, rig_model
+from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.recording import Session
 from rig_identification.result import ChannelFit, Identification, Mismatch, ParameterEstimate
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+
+#: What an ideal model assumes, put into a rig's model.
+Assumed = Callable[[RigModel], RigModel]
 
 #: The ideal model may differ from its description by so many tolerances (recording contract).
 ORDINARY = 3.0
@@ -47,14 +50,16 @@ def _silent(stage: str, fraction: float) -> None:
     _ = stage, fraction
 
 
-def pose_problem(session: Session) -> tuple[Problem, Array, tuple[Run, ...]]:
+def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Problem, Array, tuple[Run, ...]]:
     """What is to be fitted, the vector of a first guess from geometry alone, and the held-out runs.
 
+    assumed: what another ideal model than this project's assumes.
     Raises InputError where no recording holds a device that the description mounts.
     """
     rig = session.rig
     elements = first_elements(session)
     model = rig_model(rig, elements)
+    model = model if assumed is None else assumed(model)
     runs = tuple(prepare(rig, recording) for recording in session.training)
     held = tuple(prepare(rig, recording) for recording in session.holdouts)
     rests = tuple(prepare_rest(rig, recording) for recording in session.statics)
@@ -158,11 +163,15 @@ def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Pr
     return _measured_start(problem, theta, held, progress)
 
 
-def fit_session(session: Session, progress: Progress = _silent) -> Fitted:
+def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed | None = None) -> Fitted:
     """Fit the ideal model to a session and predict its held-out runs."""
     progress("first guess from rest and geometry", 0.0)
-    problem, theta, held = pose_problem(session)
-    start = start_of(problem, theta, held, progress)
+    problem, theta, held = pose_problem(session, assumed)
+    return fit_from(start_of(problem, theta, held, progress), progress)
+
+
+def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
+    """Fit the ideal model from where a session's fit starts, and predict the held-out runs."""
     evaluation, converged = solve_growing(
         start.problem,
         start.point,
@@ -240,9 +249,9 @@ CAUTION = (
 )
 
 
-def fit_ideal(session: Session, notify: Progress) -> Ideal:
+def fit_ideal(session: Session, notify: Progress, assumed: Assumed | None = None) -> Ideal:
     """Fit the ideal model and judge it; fit short pieces cautiously where it fails by far."""
-    fitted = fit_session(session, notify)
+    fitted = fit_session(session, notify, assumed)
     ideal = Ideal(fitted, *judged(fitted))
     return ideal if near_noise(fitted) else with_pieces(ideal, notify)
 
@@ -294,6 +303,8 @@ def compose(
 
     loose: factor on the body's covariance, for a trace that the model leaves.
     """
+    if careful is not None:
+        loose *= coherence(*careful)
     total = inertial_estimate(*(careful or (fitted.problem, fitted.evaluation)))
     total = replace(total, covariance=loose * total.covariance)
     frame = session.rig.frame

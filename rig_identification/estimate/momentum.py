@@ -80,7 +80,7 @@ def applied_wrench(track: Track, run: Run, parameters: ParameterSet, theta: Arra
         force = tension * along / np.linalg.norm(along, axis=1, keepdims=True)
         total += np.concatenate([force, np.cross(hinge, force)], axis=1)
     body = (
-        drive(run, parameters, theta).force @ exciter_wrench_map(parameters, theta).T if run.exciter else None
+        drive(run, parameters, theta).force @ exciter_wrench_map(parameters, theta).T if run.force else None
     )
     if body is not None:
         force = np.einsum("nij,nj->ni", R, body[:, :3])

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from rig_identification.estimate.evidence import WATCHED_NODE_STEP, Channel, Run
+from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
-from rig_identification.estimate.sampling import interpolation, jumps_of, node_values, rate_of_change
 from rig_identification.estimate.whitening import smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
@@ -42,14 +41,13 @@ def model_at(parameters: ParameterSet, theta: Array) -> RigModel:
 def drive(run: Run, parameters: ParameterSet, theta: Array) -> Input:
     """The measured exciter force at the nodes, its clock corrected."""
     quiet = Input.none(run.grid.nodes, run.grid.step)
-    if run.exciter is None:
+    if run.force is None:
         return quiet
     late = parameters.device(theta)[parameters.places.exciter_clock]
     # To first order in the clock, with a smoothed rate: resampling anew at each clock value would
     # move the noise as well, and the cost with it, in a way that no derivative describes
-    force = node_values(run.grid, run.exciter.time, run.exciter.values)
-    rate = rate_of_change(run.grid, force)
-    return Input(run.grid.step, force + late * rate, rate, quiet.wrench)
+    rate = run.force.rate
+    return Input(run.grid.step, run.force.values + late * rate, rate, quiet.wrench, run.force.middle)
 
 
 def start_basis(model: RigModel, state: State) -> Array:
@@ -146,13 +144,12 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     Two errors: the samples' noise, and the moment of a jump, which lies anywhere between two nodes.
     """
     out = np.zeros((run.grid.nodes, 6, 6))
-    if run.exciter is None or run.exciter_noise == 0.0:
+    if run.force is None or run.exciter_noise == 0.0:
         return out
     spread = exciter_wrench_map(parameters, theta)
     held = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
     out[:] = held * spread @ spread.T
-    force = node_values(run.grid, run.exciter.time, run.exciter.values)
-    jumps = spread @ jumps_of(force, run.exciter_noise)[:, :, None]
+    jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12
     return np.asarray(out + jumps @ jumps.transpose(0, 2, 1) / 12.0)
 
@@ -160,31 +157,36 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
 def _channel_rows(
     bench: Bench,
     run: Run,
-    channel: Channel,
+    index: int,
     motion: Motion,
     reading: sensors.Reading,
     own: Array,
     node: NDArray[np.int64],
+    start_only: bool,
 ) -> tuple[Array, Array, Array, Array]:
-    """(residual (g, w), derivative in [free, start] columns (g, w, c), H (g, w, X), D (g, w, 6)).
+    """(residual (g, w), derivative in [motion, own] columns (g, w, c), H (g, w, X), D (g, w, 6)).
 
-    node (g,): where each sample was taken.
+    index: of the channel. node (g,): where each sample was taken. The device's own columns, all of the
+    parameters' vector, are left out where ``start_only``.
     """
-    parameters = bench.parameters
+    parameters, channel = bench.parameters, run.channels[index]
     clock, lag = parameters.places.clock(channel.device), parameters.places.lag(channel.device)
     late, tau = own[clock], own[lag]
     groups = channel.node.size
-    value, slope = interpolation(run.grid, channel.time - late, channel.group, groups)
+    value, slope = run.samplers[index].at(late)
     columns = channel.columns
     values = lagged(run.grid.step, tau, reading.values[:, columns])
-    predicted = value @ values
-    residual = channel.grouped - predicted
+    residual = channel.grouped - value @ values
     _, _, motion_H, motion_D, motion_J = motion.derivatives
-    starts = motion_J.shape[2]
+    in_motion = motion_J.shape[2]
     in_raw = reading.in_raw[:, columns]
     nodes, width = in_raw.shape[:2]
-    total = lagged(run.grid.step, tau, (in_raw @ motion_J).reshape(nodes, width * starts))
-    jacobian = (value @ total).reshape(groups, width, starts)
+    total = lagged(run.grid.step, tau, (in_raw @ motion_J).reshape(nodes, width * in_motion))
+    jacobian = (value @ total).reshape(groups, width, in_motion)
+    H = in_raw[node] @ motion_H[node]
+    D = in_raw[node] @ motion_D[node]
+    if start_only:
+        return residual, jacobian, H, D
     device_columns, entries, scale = parameters.device_columns()
     first = device_start(parameters.places, channel.device)
     size = reading.in_device.shape[2]
@@ -198,17 +200,16 @@ def _channel_rows(
             own_columns[:, :, column] -= s * (slope @ values)
         elif entry == lag:
             own_columns[:, :, column] -= s * (slope @ lagged(run.grid.step, tau, values))
-    H = in_raw[node] @ motion_H[node]
-    D = in_raw[node] @ motion_D[node]
     return residual, np.concatenate([jacobian, own_columns], axis=2), H, D
 
 
 def longest_step(run: Run) -> float:
-    """Longest integration step (s): that of every fit, or a node's where slow motion is only watched.
+    """Longest integration step (s): that of every fit, or a node's where the run holds nothing fast.
 
-    A Runge-Kutta step of 0.025 s keeps the frequency of a 1.5 Hz swing to 3e-5.
+    A Runge-Kutta step h keeps the frequency of a swing at angular frequency w to (w h)^4/120: 4e-7 at
+    1.3 Hz with 0.01 s, 3e-5 at 1.5 Hz with the 0.025 s of a run that is only watched.
     """
-    return run.grid.step if run.grid.step >= WATCHED_NODE_STEP else FIT_STEP
+    return max(FIT_STEP, run.grid.step)
 
 
 def linearise_run(
@@ -248,7 +249,7 @@ def linearise_run(
     own = parameters.device(theta)
     in_physics = parameters.physics_jacobian(theta)[: directions.size]
     starts = basis.shape[1]
-    width = parameters.size + starts
+    known = 0 if start_only else parameters.size
     stacked: list[tuple[Array, ...]] = []
     readings: dict[str, sensors.Reading] = {}
     for index, channel in enumerate(run.channels):
@@ -261,15 +262,17 @@ def linearise_run(
         late = float(own[parameters.places.clock(channel.device)]) + max(tau, 0.0)
         node = np.clip(channel.node - round(late / run.grid.step), 0, run.grid.nodes - 1)
         residual, jacobian, H, D = _channel_rows(
-            bench, run, channel, motion, readings[channel.device], own, node
+            bench, run, index, motion, readings[channel.device], own, node, start_only
         )
-        motion_width = starts + directions.size
-        full = np.zeros((*residual.shape, width))
-        full[:, :, parameters.size :] = jacobian[:, :, :starts]
-        full[:, :, : parameters.size] = (
-            jacobian[:, :, starts:motion_width] @ in_physics + jacobian[:, :, motion_width:]
-        )
+        in_motion = starts + directions.size
         rows, axes = residual.size, channel.width
+        columns = np.empty((*residual.shape, 1 + known + starts))
+        columns[:, :, 0] = residual
+        columns[:, :, 1 + known :] = jacobian[:, :, :starts]
+        if not start_only:
+            columns[:, :, 1 : 1 + known] = (
+                jacobian[:, :, starts:in_motion] @ in_physics + jacobian[:, :, in_motion:]
+            )
         stacked.append(
             (
                 np.repeat(node, axes),
@@ -280,7 +283,7 @@ def linearise_run(
                 (
                     channel.grouped_variance + unsettled(run.grid.step, tau, channel.node, channel.grouped)
                 ).ravel(),
-                np.concatenate([residual.reshape(rows, 1), full.reshape(rows, width)], axis=1),
+                columns.reshape(rows, -1),
             )
         )
     at, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
@@ -298,9 +301,13 @@ def linearise_run(
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
         log_spread = float(np.sum(np.log(deviation)))
+    whitened = columns[:, 1:]
+    if start_only:
+        whitened = np.zeros((plain.size, parameters.size + starts))
+        whitened[:, parameters.size :] = columns[:, 1:]
     return Linearised(
         columns[:, 0],
-        columns[:, 1:],
+        whitened,
         log_spread,
         motion,
         at,

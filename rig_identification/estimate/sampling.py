@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, median_filter, uniform_filter1d
 from scipy.signal import savgol_coeffs, savgol_filter
 from scipy.sparse import csr_matrix
 
@@ -28,33 +29,69 @@ class Grid:
         return self.step * (self.nodes - 1)
 
 
-def _stencil(grid: Grid, time: Array) -> tuple[Index, Array, Array]:
-    """First node (n,), weights (n, 4) and their time derivatives (n, 4) of cubic Lagrange interpolation."""
-    first = np.clip(np.floor(time / grid.step).astype(np.int64) - 1, 0, grid.nodes - 4)
-    s = time / grid.step - first
-    nodes = np.arange(4.0)
-    weights = np.ones((time.size, 4))
-    slopes = np.zeros((time.size, 4))
-    for j in range(4):
-        others = [k for k in range(4) if k != j]
-        scale = np.prod([nodes[j] - k for k in others])
-        factors = np.stack([s - k for k in others], axis=1)
-        weights[:, j] = np.prod(factors, axis=1) / scale
-        for omit in range(3):
-            slopes[:, j] += np.prod(np.delete(factors, omit, axis=1), axis=1) / scale
-    return first, weights, slopes / grid.step
+#: Cubic Lagrange polynomials through nodes 0 to 3: coefficients (node, power).
+_CUBIC = np.array(
+    [[6.0, -11.0, 6.0, -1.0], [0.0, 18.0, -15.0, 3.0], [0.0, -9.0, 12.0, -3.0], [0.0, 2.0, -3.0, 1.0]]
+)
+_CUBIC /= 6.0
+
+
+class Sampler:
+    """Cubic interpolation from the nodes to one channel's grouped samples, whatever its clock is late by.
+
+    A weight is a cubic in the lateness: which nodes it is of is found once, and a new
+    lateness costs four numbers a weight.
+    """
+
+    def __init__(self, grid: Grid, time: Array, group: Index, groups: int) -> None:
+        """grid: the nodes. time (n,), group (n,): of each sample; groups: number of groups."""
+        self._grid, self._time, self._group, self._groups = grid, time, group, groups
+        self._found = self._weights(0)
+
+    def _weights(self, shift: int) -> tuple[int, Array, Any, Any]:
+        """For a lateness of ``shift`` nodes: Taylor coefficients (4, w) of the weights, their nodes, rows."""
+        grid = self._grid
+        position = self._time / grid.step - shift
+        first = np.clip(np.floor(position).astype(np.int64) - 1, 0, grid.nodes - 4)
+        s = position - first
+        share = 1.0 / np.bincount(self._group, minlength=self._groups)[self._group]
+        key = (self._group * grid.nodes + first)[:, None] + np.arange(4)
+        cells, place = np.unique(key, return_inverse=True)
+        place = place.ravel()
+        c = _CUBIC
+        s = s[:, None]
+        taylor = (
+            c[:, 0] + s * (c[:, 1] + s * (c[:, 2] + s * c[:, 3])),
+            c[:, 1] + s * (2.0 * c[:, 2] + s * 3.0 * c[:, 3]),
+            c[:, 2] + s * 3.0 * c[:, 3],
+            np.broadcast_to(c[:, 3], key.shape),
+        )
+        weights = [np.bincount(place, (t * share[:, None]).ravel(), cells.size) for t in taylor]
+        powers = np.array(weights, dtype=np.float64)
+        rows = np.searchsorted(cells // grid.nodes, np.arange(self._groups + 1))
+        return shift, powers, cells % grid.nodes, rows
+
+    def at(self, late: float = 0.0) -> tuple[csr_matrix, csr_matrix]:
+        """Matrices (groups, nodes): mean over each group of the interpolated value, and of its rate.
+
+        late: s by which the samples' stamps are late.
+        """
+        shift = round(late / self._grid.step)
+        found = self._found
+        if shift != found[0]:
+            # In one piece: another thread may read it
+            found = self._found = self._weights(shift)
+        _, powers, nodes, rows = found
+        d = shift - late / self._grid.step
+        value = powers[0] + d * (powers[1] + d * (powers[2] + d * powers[3]))
+        slope = (powers[1] + d * (2.0 * powers[2] + d * 3.0 * powers[3])) / self._grid.step
+        shape = (self._groups, self._grid.nodes)
+        return csr_matrix((value, nodes, rows), shape=shape), csr_matrix((slope, nodes, rows), shape=shape)
 
 
 def interpolation(grid: Grid, time: Array, group: Index, groups: int) -> tuple[csr_matrix, csr_matrix]:
-    """Matrices (groups, nodes): mean over each group of the interpolated value, and of its rate."""
-    first, weights, slopes = _stencil(grid, time)
-    share = 1.0 / np.bincount(group, minlength=groups)[group]
-    rows = np.repeat(group, 4)
-    columns = (first[:, None] + np.arange(4)).ravel()
-    shape = (groups, grid.nodes)
-    value = csr_matrix(((weights * share[:, None]).ravel(), (rows, columns)), shape=shape)
-    slope = csr_matrix(((slopes * share[:, None]).ravel(), (rows, columns)), shape=shape)
-    return value, slope
+    """:class:`Sampler` for stamps that are right, used once."""
+    return Sampler(grid, time, group, groups).at()
 
 
 def group_by_node(grid: Grid, time: Array) -> tuple[Index, Index]:
@@ -115,9 +152,77 @@ def jumps_of(nodes: Array, noise: float) -> Array:
     return np.where(np.abs(excess) > least, excess, 0.0)
 
 
+@dataclass(frozen=True)
+class NodeInput:
+    """An input as the forward model takes it: at the nodes, midway between them, and how it changes."""
+
+    values: Array  # (nodes, w) at the nodes
+    middle: Array  # (nodes, w) midway to the next node, beyond the mean of both
+    rate: Array  # (nodes, w) per s, smoothed
+    jumps: Array  # (nodes, w) see jumps_of
+
+    def between(self, first: int, last: int) -> NodeInput:
+        """The input at nodes ``first`` to ``last``."""
+        cut = slice(first, last + 1)
+        return NodeInput(self.values[cut], self.middle[cut], self.rate[cut], self.jumps[cut])
+
+
+def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInput:
+    """Samples (n, w) as an input at the nodes; noise: standard deviation of one sample.
+
+    The best piecewise line through dense samples of a smooth f overshoots it at the nodes by h^2 f''/12,
+    which an accelerometer or a load cell would read, and through samples at the nodes alone by nothing.
+    What it makes of a parabola sampled alike is taken off, and what a parabola has between two nodes is
+    put back. About a jump, where f has no curvature, the line stays as it is.
+    """
+    line = node_values(grid, time, values)
+    jumps = jumps_of(line, noise)
+    rate = rate_of_change(grid, line)
+    if grid.nodes < 5:
+        return NodeInput(line, np.zeros_like(line), rate, jumps)
+    rough = np.any(jumps != 0.0, axis=1)[:, None]
+    rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
+    curved = np.zeros_like(line)
+    curved[1:-1] = (line[2:] - 2.0 * line[1:-1] + line[:-2]) / grid.step**2
+    nodes = grid.step * np.arange(grid.nodes)[:, None]
+    over = node_values(grid, time, 0.5 * time[:, None] ** 2) - 0.5 * nodes**2
+    # Where there are no samples the line is straight, and nothing is known of a curvature
+    over = np.clip(over, -1.0 / 6.0 * grid.step**2, 1.0 / 6.0 * grid.step**2)
+    smooth = np.where(rough, line, line - over * curved)
+    middle = np.zeros_like(line)
+    middle[1:-2] = (smooth[1:-2] + smooth[2:-1] - smooth[:-3] - smooth[3:]) / 16.0
+    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, jumps)
+
+
 def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
     """(nodes, w) time derivative of a noisy input, smoothed over ``smoothing`` seconds."""
     return np.asarray(np.gradient(gaussian_filter1d(nodes, smoothing / grid.step, axis=0), grid.step, axis=0))
+
+
+#: Frequencies over which a spectrum is averaged, Hz.
+AVERAGED_OVER = 1.0
+
+
+def cubic_error(time: Array, values: Array, noise: Array, step: float) -> Array:
+    """(w,) root mean square error of cubic interpolation between nodes ``step`` apart, in the values' unit.
+
+    At angular frequency w a cubic through four nodes errs by up to 3/128 (w step)^4 of the
+    amplitude, midway between two. What it makes of the samples' own noise (w,) does not count.
+    """
+    count = time.size
+    rate = (count - 1) / max(float(time[-1] - time[0]), 1e-9)
+    window = np.hanning(count)
+    centred = (values - np.mean(values, axis=0)) * window[:, None]
+    # Variance in each line, one-sided, window undone
+    power = 2.0 * np.abs(np.fft.rfft(centred, axis=0)) ** 2 / (count * np.sum(window**2))
+    frequency = np.fft.rfftfreq(count, 1.0 / rate)
+    width = max(1, round(AVERAGED_OVER * count / rate))
+    power = uniform_filter1d(power, width, axis=0)
+    # A mean over so many lines exceeds white noise's by chance up to here
+    chance = 1.0 + 4.0 / np.sqrt(width)
+    signal = np.maximum(power - chance * 2.0 * noise**2 / count, 0.0)
+    share = np.minimum(1.0, 3.0 / 128.0 * (2.0 * np.pi * frequency * step) ** 4)
+    return np.asarray(np.sqrt(np.sum(signal * share[:, None] ** 2, axis=0)))
 
 
 #: Stretch over which motion is a cubic to well below any sensor's noise, s.

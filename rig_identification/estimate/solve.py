@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL, Parameter
@@ -103,14 +105,26 @@ def _prior(problem: Problem, theta: Array) -> tuple[float, Array, Array]:
     return cost, information, gradient
 
 
-def evaluate(problem: Problem, point: Point) -> Evaluation | None:
-    """Linearise everything at ``point``; None where a run or a rest pose cannot be computed."""
+def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) -> Evaluation | None:
+    """Linearise everything at ``point``; None where a run or a rest pose cannot be computed.
+
+    residuals_only: residuals and cost hold, what else is derived from derivatives does not; it takes a
+    quarter of the time.
+    """
     bench = problem.bench
     latents = point.latents or (None,) * len(problem.runs)
 
     def one(item: tuple[Run, State, Array | None]) -> Linearised | None:
         run, start, latent = item
-        return linearise_run(bench, run, point.theta, start, extra_noise=problem.extra_noise, latent=latent)
+        return linearise_run(
+            bench,
+            run,
+            point.theta,
+            start,
+            start_only=residuals_only,
+            extra_noise=problem.extra_noise,
+            latent=latent,
+        )
 
     with ThreadPoolExecutor(max_workers=2) as pool:
         runs = list(pool.map(one, zip(problem.runs, point.starts, latents, strict=True)))
@@ -176,15 +190,16 @@ def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
     return Point(theta, tuple(starts), guesses, evaluation.point.latents)
 
 
-def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Array:
+def _bounded_step(problem: Problem, current: Evaluation, damping: float, bend: Array | float = 0.0) -> Array:
     """Damped Gauss-Newton step that keeps the free parameters within their bound.
 
     The body moves by no more than the problem's stride; everything else then takes the step
-    that is best with the body where it got to.
+    that is best with the body where it got to. bend: what curvature adds to the gradient.
     """
     information = current.information + damping * np.diag(np.diag(current.information))
     change = np.zeros(information.shape[0])
     fixed = np.zeros(information.shape[0], dtype=bool)
+    current = replace(current, gradient=current.gradient + bend)
     change = _step_within_bounds(problem, current, information, change, fixed)
     longest = float(np.max(np.abs(change[:INERTIAL]) / problem.weak))
     if longest <= problem.stride:
@@ -198,30 +213,102 @@ def _bounded_step(problem: Problem, current: Evaluation, damping: float) -> Arra
 def _step_within_bounds(
     problem: Problem, current: Evaluation, information: Array, change: Array, fixed: NDArray[np.bool_]
 ) -> Array:
-    """Newton step of all that is not ``fixed``, which makes the ``change`` given.
+    """Best step of all that is not ``fixed``, which makes the ``change`` given, with every bound kept.
 
-    Active set: a parameter that the step would carry past its bound goes onto it, and the
-    others are solved for again with that move made (Nocedal & Wright, "Numerical
-    Optimization", section 16.7).
+    Where Newton's step passes a bound, unbounded unknowns are eliminated (Schur complement), which leaves
+    a convex quadratic problem in a box.
     """
     p = problem.bench.parameters.size
-    theta = current.point.theta
-    limit = np.array([_limit(problem, q) for q in problem.bench.parameters.free])
-    change, fixed = change.copy(), fixed.copy()
-    for _ in range(20):
-        open_ = np.flatnonzero(~fixed)
-        held = np.flatnonzero(fixed)
-        right = current.gradient[open_] - information[np.ix_(open_, held)] @ change[held]
-        change[open_] = np.linalg.solve(information[np.ix_(open_, open_)], right)
-        reached = np.zeros_like(fixed)
-        target = theta[INERTIAL:p] + change[INERTIAL:p]
-        reached[INERTIAL:p] = (np.abs(target) > limit + 1e-9) & ~fixed[INERTIAL:p]
-        if not np.any(reached):
-            break
-        beyond = np.flatnonzero(reached)
-        change[beyond] = np.sign(theta[beyond] + change[beyond]) * limit[beyond - INERTIAL] - theta[beyond]
-        fixed |= reached
+    open_, held = np.flatnonzero(~fixed), np.flatnonzero(fixed)
+    inside = information[np.ix_(open_, open_)]
+    right = current.gradient[open_] - information[np.ix_(open_, held)] @ change[held]
+    change = change.copy()
+    change[open_] = np.linalg.solve(inside, right)
+    limit = np.full(change.size, np.inf)
+    limit[INERTIAL:p] = [_limit(problem, q) for q in problem.bench.parameters.free]
+    here = np.zeros(change.size)
+    here[:p] = current.point.theta
+    if np.all(np.abs(here + change)[open_] <= limit[open_] + 1e-9):
+        return change
+    boxed = np.isfinite(limit[open_])
+    inner, outer = np.flatnonzero(boxed), np.flatnonzero(~boxed)
+    across = inside[np.ix_(outer, inner)]
+    solved = np.linalg.solve(
+        inside[np.ix_(outer, outer)], np.concatenate([across, right[outer, None]], axis=1)
+    )
+    box, middle = limit[open_][inner], here[open_][inner]
+    step = _in_box(
+        inside[np.ix_(inner, inner)] - across.T @ solved[:, :-1],
+        right[inner] - across.T @ solved[:, -1],
+        -box - middle,
+        box - middle,
+    )
+    change[open_[inner]] = step
+    change[open_[outer]] = solved[:, -1] - solved[:, :-1] @ step
     return change
+
+
+#: Rounds in which all that is on the wrong side changes sides at once, and what counts as zero there.
+PIVOTS, BARELY = 20, 1e-9
+
+
+def _in_box(matrix: Array, right: Array, low: Array, high: Array) -> Array:
+    """The x (n,) in [low, high] that minimises x^T matrix x / 2 - right^T x; matrix (n, n) positive definite.
+
+    Block principal pivoting: what passes a bound goes onto it, what is pressed inwards from one comes free
+    (Portugal, Judice and Vicente, "A comparison of block pivoting and interior-point algorithms for linear
+    least squares problems with nonnegative variables", 1994). It ends after a few rounds, or hardly ever does
+    not; bounded-variable least squares then, which is certain and slow (Stark and Parker, 1995).
+    """
+    side = np.zeros(right.size, dtype=np.int64)  # -1 at low, 1 at high
+    scale = np.sqrt(np.diag(matrix))
+    for _ in range(PIVOTS):
+        x = np.where(side < 0, low, high)
+        free = side == 0
+        held = ~free
+        x[free] = np.linalg.solve(
+            matrix[np.ix_(free, free)], right[free] - matrix[np.ix_(free, held)] @ x[held]
+        )
+        pull = (right - matrix @ x) / scale
+        over, under = free & (x * scale > high * scale + BARELY), free & (x * scale < low * scale - BARELY)
+        loose = held & (side * pull < -BARELY * np.max(np.abs(right / scale)))
+        if not np.any(over | under | loose):
+            return np.clip(x, low, high)
+        side = np.where(over, 1, np.where(under, -1, np.where(loose, 0, side)))
+    root = np.linalg.cholesky(matrix)
+    target = solve_triangular(root, right, lower=True)
+    return np.asarray(np.clip(lsq_linear(root.T, target, (low, high), method="bvls").x, low, high))
+
+
+#: Part of a step before and after which its curvature is looked at, and length of what curvature adds, in
+#: parts of the step, beyond which it is not to be trusted.
+AHEAD, TOO_BENT = 0.2, 0.75
+
+
+def _along_valley(problem: Problem, current: Evaluation, damping: float, change: Array) -> Array:
+    """The step ``change`` bent to second order along the valley that it starts in.
+
+    The second derivative of all residuals along a step, by two more evaluations without derivatives, says
+    where the floor of a curved valley goes ("geodesic acceleration": Transtrum and Sethna, "Improvements to
+    the Levenberg-Marquardt algorithm for nonlinear least-squares minimization", 2012, arXiv:1201.5885).
+    From both sides, because the whitening's own first derivative is not in the Jacobian.
+    """
+    before, after = (
+        evaluate(problem, _moved(problem, current, s * AHEAD * change), residuals_only=True) for s in (-1, 1)
+    )
+    if before is None or after is None:
+        return change
+    p = start = problem.bench.parameters.size
+    bend = np.zeros(change.size)
+    for here, one, other in zip(current.runs, before.runs, after.runs, strict=True):
+        end = start + here.jacobian.shape[1] - p
+        columns = np.concatenate([np.arange(p), np.arange(start, end)])
+        bend[columns] += here.jacobian.T @ (0.5 * (one.residual + other.residual) - here.residual) / AHEAD**2
+        start = end
+    bent = _bounded_step(problem, current, damping, bend)
+    weight = np.diag(current.information)
+    far = np.sqrt(float(weight @ (bent - change) ** 2) / max(float(weight @ change**2), 1e-300))
+    return bent if 2.0 * far < TOO_BENT else change
 
 
 #: No positive number leaves so many std of its logarithm's prior.
@@ -240,6 +327,12 @@ HOPELESS = 100.0
 #: Share of what noise does not account for below which a step's gain is not worth taking: a model
 #: that lacks something has no optimum worth polishing.
 POLISH = 3e-3
+#: Factors on the damping after a step that paid and after one that did not.
+EASED, BRAKED = 0.2, 5.0
+#: Evaluations that a fit may take for each of its steps on average, and what one without derivatives costs.
+PATIENCE, QUICK = 3.0, 0.3
+#: Damped steps of so little gain, one after the other, that end a fit as well.
+IDLE = 2
 #: Gain (nats) of a step that gets nowhere, and how many of them in a row end a fit.
 CREEP, CREPT = 0.01, 4
 
@@ -269,6 +362,7 @@ def solve(
     iterations: int = 30,
     tolerance: float = 1e-3,
     polish: float = 0.0,
+    bends: bool = False,
     notify: Callable[[int, float], None] | None = None,
 ) -> tuple[Evaluation, bool]:
     """Minimise from ``point``: (last evaluation, whether it converged).
@@ -276,31 +370,53 @@ def solve(
     Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
     a step won less than ``polish`` of what stays unexplained, the fit ends there as well: a
-    hypothesis that leaves much is not worth following down every valley. Steps that win next to nothing,
-    one after the other, end it too, unconverged: along bounds a valley may be followed for ever.
+    hypothesis that leaves much is not worth following down every valley. After a step that did not pay the
+    next ones are tried without derivatives first, and where ``bends`` bent along their valley. Steps that
+    win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
+    followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count.
     """
     current = evaluate(problem, point)
     if current is None:
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
-    damping, creeping = 1e-6, 0
+    damping, failed, creeping, idle, spent = 1e-6, 0.0, 0, 0, 0.0
     for iteration in range(iterations):
+        turned_back = False
         while True:
+            if spent > PATIENCE * iterations:
+                return current, False
+            # About as little damping failed last
+            wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
-            gain = 0.5 * float(change @ current.gradient)
+            gain = float(change @ current.gradient - 0.5 * change @ current.information @ change)
             if gain < tolerance and damping <= 1e-3:
                 return current, not on_plateau(current)
-            trial = evaluate(problem, _moved(problem, current, change))
+            if damping > 1e-3 and gain < polish * excess(current):
+                # Held back so much, no step can win what would be worth it
+                return current, False
+            if wary and bends:
+                change = _along_valley(problem, current, damping, change)
+                spent += 2.0 * QUICK
+            moved = _moved(problem, current, change)
+            trial = evaluate(problem, moved, residuals_only=True) if wary else None
+            spent += QUICK if wary else 0.0
+            if not wary or (trial is not None and trial.cost < current.cost):
+                trial = evaluate(problem, moved)
+                spent += 1.0
             if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
-                damping = max(damping * 0.1, 1e-9)
+                if damping <= failed:
+                    failed = 0.0
+                damping = damping if turned_back else max(damping * EASED, 1e-9)
                 won, current = current.cost - trial.cost, trial
                 creeping = creeping + 1 if won < CREEP else 0
                 if creeping == CREPT:
                     return current, False
-                if max(won, tolerance) < polish * excess(current) and damping <= 1e-3:
-                    return current, not on_plateau(current)
+                idle = idle + 1 if max(won, tolerance) < polish * excess(current) else 0
+                if idle and (damping <= 1e-3 or idle == IDLE):
+                    return current, damping <= 1e-3 and not on_plateau(current)
                 break
-            damping = max(damping, 1e-6) * 10.0
+            failed, turned_back = max(failed, damping), True
+            damping = max(damping, 1e-6) * BRAKED
             if damping > 1e6:
                 return current, False
         if notify is not None:
@@ -318,11 +434,12 @@ def fit_start(
     tolerance: float = 1e-3,
     extra_noise: Array | None = None,
     spread: float = np.inf,
+    polish: float = 0.0,
 ) -> tuple[Linearised, State] | None:
     """The run's own start state alone, everything else held: what a held-out run may be given.
 
     extra_noise (6, 6): see :func:`linearise_run`. spread: std of a prior on the start about
-    ``start`` (m, rad; twice as much m/s, rad/s).
+    ``start`` (m, rad; twice as much m/s, rad/s). polish: see :func:`solve`.
     """
     p = bench.parameters.size
     model = model_at(bench.parameters, theta)
@@ -349,7 +466,11 @@ def fit_start(
         further = moved_so_far + change
         prior_change = 0.5 * float(weight @ (further**2 - moved_so_far**2))
         if trial is not None and trial.cost + prior_change < current.cost + 1e-9 * abs(current.cost):
+            won = current.cost - trial.cost
             current, start, moved_so_far, damping = trial, moved, further, max(damping * 0.1, 1e-12)
+            left = 0.5 * float(current.residual @ current.residual - current.residual.size)
+            if max(won, tolerance) < polish * left:
+                break
         else:
             damping = max(damping, 1e-6) * 10.0
             if damping > 1e6:

@@ -110,7 +110,7 @@ def loudest(fitted: Fitted) -> float:
     return max([1.0, *(w.band.power for w in witnesses if w.band.log10_p < limit)])
 
 
-def _weighed_otherwise(fitted: Fitted) -> str | None:
+def weighed_otherwise(fitted: Fitted) -> str | None:
     """What the ground scale says against the fit, where chance does not account for it."""
     if fitted.problem.mass is None:
         return None
@@ -119,6 +119,20 @@ def _weighed_otherwise(fitted: Fitted) -> str | None:
     if chi2.sf(((mass - value) / std) ** 2, 1) > 0.5 * FALSE_ALARM:
         return None
     return f"the rig carries {mass:.6g} kg, the scale says {value:.6g} ± {std:.2g} kg"
+
+
+def _restless(fitted: Fitted, tried: int) -> list[str]:
+    """Recordings at rest whose means the fit misses by more than chance does. tried: tests in all."""
+    limit = FALSE_ALARM / max(1, tried)
+    out = []
+    for evidence, rest in zip(fitted.problem.rests, fitted.evaluation.rests, strict=True):
+        if chi2.sf(float(np.sum(rest.residual**2)), rest.residual.size) < limit:
+            out.append(f"at rest in {evidence.recording.name} the means lie up to {_farthest(rest.residual)}")
+    return out
+
+
+def _farthest(residual: Array) -> str:
+    return f"{float(np.max(np.abs(residual))):.3g} of their standard deviations off"
 
 
 def judge(
@@ -131,7 +145,7 @@ def judge(
     """Verdict ``none`` or ``unexplained`` with its reason."""
     witnesses = all_witnesses(fitted)
     pressed = _pressed(fitted, ordinary)
-    heavy = _weighed_otherwise(fitted)
+    heavy = weighed_otherwise(fitted)
     beyond = [p for p in parameters if p.name in pressed]
     reasons = []
     if witnesses:
@@ -144,6 +158,7 @@ def judge(
                 f"between {worst.band.low:.2g} and {worst.band.high:.2g} Hz "
                 f"it has {worst.band.power:.3g} times the power of white noise"
             )
+    reasons += _restless(fitted, len(witnesses) + len(fitted.problem.rests))
     if not fitted.converged:
         reasons.append("the fit did not settle")
     if heavy is not None:

@@ -62,11 +62,13 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
                 spread += h[i] * gain[i]
             deviation = np.sqrt(spread)
             log_sum += np.log(deviation)
+            # Row by row: each line of X lies together in memory
+            for i in range(size):
+                if h[i] != 0.0:
+                    for c in range(count):
+                        columns[row, c] -= h[i] * X[i, c]
             for c in range(count):
-                total = columns[row, c]
-                for i in range(size):
-                    total -= h[i] * X[i, c]
-                columns[row, c] = total / deviation
+                columns[row, c] /= deviation
             for i in range(size):
                 g = gain[i] / deviation
                 for c in range(count):
@@ -78,12 +80,7 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
             row += 1
         F[:, :states] = A[k]
         F[:, states:] = B[k]
-        for i in range(states):
-            for c in range(count):
-                total = 0.0
-                for j in range(size):
-                    total += F[i, j] * X[j, c]
-                x_next[i, c] = total
+        x_next[:, :] = np.dot(F, X)
         P_next[:, :] = np.dot(np.dot(F, P), F.T)
         for i in range(states):
             for c in range(count):

@@ -12,7 +12,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import fit_start_growing
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.prediction import Linearised, model_at
-from rig_identification.estimate.solve import Point, Problem, solve
+from rig_identification.estimate.solve import POLISH, Point, Problem, solve
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
 
@@ -28,7 +28,9 @@ def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fi
         begun.get((run.recording.name, run.offset)) or launch_state(whole.bench, run, point.theta, rest)
         for run in whole.runs
     )
-    evaluation, converged = solve(whole, Point(point.theta, starts, point.rest_guesses), iterations=20)
+    begin = Point(point.theta, starts, point.rest_guesses)
+    bends = whole.bench.parameters.model.internal > 0
+    evaluation, converged = solve(whole, begin, iterations=20, polish=POLISH, bends=bends)
     held_runs, held = predicted(whole, ideal.holdout_runs, evaluation.point.theta, rest)
     return replace(
         ideal,

@@ -1,24 +1,73 @@
-"""Left-out physics switched on in a simulated plant: the effects that estimator and plant share."""
+"""Left-out physics switched on in a simulated plant: the effects that estimator and plant share.
+
+What an effect does to the motion stands in ``model/effects/``; here its numbers are put where the
+forward model looks for them. The switches that people set are in :mod:`plant_switches`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.live.push import Push
 from rig_identification.model import layout
 from rig_identification.model.effects import place
-from rig_identification.model.equilibrium import design_pose, settle
-from rig_identification.model.motion import RigModel
+from rig_identification.model.equilibrium import design_pose, find_rest, settle
+from rig_identification.model.motion import RigModel, State
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Rider:
+    """A mass that moves against the body. The body's ten numbers count it as fixed at its place."""
+
+    mass: float  # kg
+    position: Array  # (3,) m, body frame: where it rests
+    directions: Array  # (k, 3) unit vectors, body axes; of a liquid none: it swings to all sides
+    frequency: float  # Hz
+    damping_ratio: float
+    stop: float = 0.0  # m each way to its stops; 0: none
+
+    def blocks(self, R_rest: Array) -> Array:
+        """(k, INTERNAL_SIZE) numbers of its coordinates (model/layout.py). R_rest: body in world at rest."""
+        hangs = self.directions.shape[0] == 0
+        axes = R_rest[:2] if hangs else self.directions  # the two horizontal ones, in body axes
+        out = np.zeros((axes.shape[0], layout.INTERNAL_SIZE))
+        out[:, layout.AXIS : layout.AXIS + 3] = axes
+        out[0, layout.MASS] = self.mass
+        out[0, layout.POINT : layout.POINT + 3] = self.position
+        out[0, layout.FREQUENCY], out[0, layout.DAMPING_RATIO] = self.frequency, self.damping_ratio
+        out[0, layout.STOP], out[0, layout.PENDULUM] = self.stop, float(hangs)
+        return out
+
+
+@dataclass(frozen=True)
+class YieldingCeiling:
+    """The upper hinges move together, along each world axis that has a stiffness."""
+
+    stiffness: Array  # (3,) N/m; 0: does not yield
+    mass: float  # kg that moves with the hinges
+    damping_ratio: float
+
+    def blocks(self) -> Array:
+        """(k, INTERNAL_SIZE) numbers of its coordinates (model/layout.py)."""
+        axes = np.flatnonzero(self.stiffness > 0.0)
+        out = np.zeros((axes.size, layout.INTERNAL_SIZE))
+        out[:, layout.KIND], out[:, layout.LEADER] = layout.CEILING, np.arange(axes.size)
+        out[np.arange(axes.size), layout.AXIS + axes] = 1.0
+        out[:, layout.COMPLIANCE] = 1.0 / self.stiffness[axes]
+        out[:, layout.FREQUENCY] = np.sqrt(self.stiffness[axes] / self.mass) / (2.0 * np.pi)
+        out[:, layout.DAMPING_RATIO] = self.damping_ratio
+        return out
+
+
+@dataclass(frozen=True)
 class PlantEffects:
-    """How the plant differs from the ideal rig of its description; zero everywhere: not at all."""
+    """How the plant differs from the ideal rig of its description; as it comes: not at all."""
 
     hinge_damping: float = 0.0  # N m s/rad, each hinge
     hinge_friction: float = 0.0  # N m, each hinge
@@ -26,23 +75,27 @@ class PlantEffects:
     air_added_mass: float = 0.0  # kg
     exciter_rotor: float = 0.0  # kg
     cable_mass: float = 0.0  # kg/m
+    axial_stiffness: float = 0.0  # N, EA of the cables; 0: inextensible
+    axial_damping_ratio: float = 0.0  # of the body's bounce on its cables
     tether: Array = field(default_factory=lambda: np.zeros(3))  # N/m, world axes
     tether_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
     exciter_gain: float = 0.0  # 0.01: the true force is 1 % above the measured one
     cable_length: Array = field(default_factory=lambda: np.zeros(1))  # m that cables are longer, each or all
+    ceiling_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, world: hinges' errors
+    body_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, body: hinges' errors
     level_error: Array = field(default_factory=lambda: np.zeros(2))  # rad, ceiling tilted about world x and y
+    riders: tuple[Rider, ...] = ()
+    ceiling: YieldingCeiling | None = None
+    push: Push | None = None  # acts through the motion's input, not through the model's numbers
 
 
 def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
-    """The same rig with ``effects``; a tether is slack where the ideal rig hangs at rest."""
-    physics = model.physics.copy()
-    physics[layout.EXCITER_GAIN] = 1.0 + effects.exciter_gain
-    for i, error in enumerate(np.broadcast_to(effects.cable_length, (model.cables,))):
-        physics[layout.cable_offset(i) + layout.LENGTH] += error
-    # A ceiling tilted against gravity is gravity tilted against the ceiling
-    tilt = Rotation.from_rotvec([effects.level_error[0], effects.level_error[1], 0.0])
-    gravity = physics[layout.GRAVITY : layout.GRAVITY + 3]
-    physics[layout.GRAVITY : layout.GRAVITY + 3] = tilt.inv().apply(gravity)
+    """The same rig with ``effects``.
+
+    A tether is slack, and a rider's spring bears its weight, where the rig hangs at rest without these.
+    """
+    elastic = _elastic(model, effects)
+    physics = _with_rig_errors(elastic, effects)
     block = place.effects_block(model.cables)
     physics[block + place.DAMPING] = effects.hinge_damping
     physics[block + place.FRICTION] = effects.hinge_friction
@@ -50,11 +103,53 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.ADDED_MASS] = effects.air_added_mass
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
     physics[block + place.LINEAR_DENSITY] = effects.cable_mass
-    rest = settle(model, design_pose(model))
+    rest = _rest(elastic.with_physics(physics))
     physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3] = rest.position
     physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9] = (
         rest.R_world_body.ravel()
     )
     physics[block + place.TETHER_STIFFNESS : block + place.TETHER_STIFFNESS + 3] = effects.tether
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = effects.tether_point
-    return model.with_physics(physics)
+    out = elastic.with_physics(physics)
+    for rider in effects.riders:
+        out = out.with_internal(rider.blocks(rest.R_world_body))
+    return out if effects.ceiling is None else out.with_internal(effects.ceiling.blocks())
+
+
+def _rest(model: RigModel) -> State:
+    guess = settle(model, design_pose(model))
+    rest = find_rest(model, guess)
+    return rest.state if rest.converged else guess
+
+
+def _elastic(model: RigModel, effects: PlantEffects) -> RigModel:
+    """Cables that stretch, all alike; those that cannot go slack push as well."""
+    if effects.axial_stiffness <= 0.0:
+        return model
+    n = model.cables
+    physics = model.physics.copy()
+    offsets = np.array([layout.cable_offset(i) for i in range(n)])
+    stiffness = effects.axial_stiffness * float(np.sum(1.0 / physics[offsets + layout.LENGTH]))
+    bounce = np.sqrt(stiffness / physics[layout.INERTIAL])
+    physics[offsets + layout.AXIAL_STIFFNESS] = effects.axial_stiffness
+    physics[offsets + layout.AXIAL_DAMPING] = 2.0 * effects.axial_damping_ratio / bounce
+    modes = np.where(model.can_slacken, layout.ELASTIC, layout.ELASTIC_ROD).astype(np.int64)
+    return replace(model, physics=physics, modes=modes, can_slacken=np.zeros(n, dtype=np.bool_))
+
+
+def _with_rig_errors(model: RigModel, effects: PlantEffects) -> Array:
+    """Numbers of a rig whose geometry and exciter are not as described."""
+    n = model.cables
+    physics = model.physics.copy()
+    physics[layout.EXCITER_GAIN] *= 1.0 + effects.exciter_gain
+    ceiling, body = (np.broadcast_to(e, (n, 3)) for e in (effects.ceiling_points, effects.body_points))
+    for i, error in enumerate(np.broadcast_to(effects.cable_length, (n,))):
+        o = layout.cable_offset(i)
+        physics[o + layout.LENGTH] += error
+        physics[o + layout.CEILING_POINT : o + layout.CEILING_POINT + 3] += ceiling[i]
+        physics[o + layout.BODY_POINT : o + layout.BODY_POINT + 3] += body[i]
+    # A ceiling tilted against gravity is gravity tilted against the ceiling
+    tilt = Rotation.from_rotvec([effects.level_error[0], effects.level_error[1], 0.0])
+    gravity = physics[layout.GRAVITY : layout.GRAVITY + 3]
+    physics[layout.GRAVITY : layout.GRAVITY + 3] = tilt.inv().apply(gravity)
+    return np.asarray(physics)

@@ -36,7 +36,14 @@ class WrenchUncertainty:
 
 
 def wrench_uncertainty(
-    rig: Rig, pose: Array, tension: Array, exciter_force: Array, center_of_mass: Array, center_std: Array
+    rig: Rig,
+    pose: Array,
+    tension: Array,
+    exciter_force: Array,
+    center_of_mass: Array,
+    center_std: Array,
+    weight: float = 0.0,
+    weight_std: float = 0.0,
 ) -> WrenchUncertainty:
     """Uncertainty of one instant's wrench, each source by the rig's noise and tolerances.
 
@@ -50,9 +57,11 @@ def wrench_uncertainty(
         N, exciter frame.
     center_of_mass, center_std : (3,)
         m, body frame.
+    weight, weight_std : float
+        N; a weight of 0 leaves gravity out. A tilt that is wrong turns it with everything else.
     """
     R = Rotation.from_quat(pose[3:]).as_matrix()
-    columns = _cable_columns(rig, pose[:3], R, tension, center_of_mass)
+    columns = _cable_columns(rig, pose[:3], R, tension, center_of_mass, weight)
     total, force_columns = _force_columns(rig, tension, exciter_force, center_of_mass, pose[:3], R)
     noise, tolerance = rig.noise, rig.tolerance
     inclination = np.hypot(noise.get("inclination", 0.0), tolerance["inclinometer_orientation"])
@@ -71,6 +80,8 @@ def wrench_uncertainty(
         "exciter": force_columns * exciter,
         "centre of mass": center,
     }
+    if weight > 0.0:
+        shares["weight"] = np.concatenate([weight_std * R[2], np.zeros(3)])[:, None]
     return WrenchUncertainty({name: np.sqrt(np.sum(share**2, axis=1)) for name, share in shares.items()})
 
 
@@ -84,7 +95,9 @@ class _Columns:
     inclination: Array  # (6, 2)
 
 
-def _cable_columns(rig: Rig, position: Array, R: Array, tension: Array, center: Array) -> _Columns:
+def _cable_columns(
+    rig: Rig, position: Array, R: Array, tension: Array, center: Array, weight: float
+) -> _Columns:
     n = len(rig.cables)
     along = np.zeros((6, n))
     in_pose, in_hinge = np.zeros((6, 6)), np.zeros((6, 6 * n))
@@ -105,7 +118,9 @@ def _cable_columns(rig: Rig, position: Array, R: Array, tension: Array, center: 
         in_hinge[:, c], in_hinge[:, h] = lever @ stiff @ R.T, -lever @ stiff
         in_hinge[3:, h] -= tension[i] * skew(u)  # the arm itself
         length_in_hinge[i, c], length_in_hinge[i, h] = u @ R.T, -u
-    tilt = np.hstack([np.zeros((2, 3)), skew(R.T[:, 2])[:2]])
+    # The vertical in body axes, up' = up + up x dtheta
+    in_pose[:3, 3:] -= weight * skew(R[2])
+    tilt = np.hstack([np.zeros((2, 3)), skew(R[2])[:2]])
     solved = in_pose @ np.linalg.pinv(np.vstack([length_in_pose, tilt]))
     return _Columns(along, solved[:, :n], in_hinge - solved[:, :n] @ length_in_hinge, solved[:, n:])
 

@@ -29,7 +29,7 @@ class Candidate:
     tell: Callable[[dict[str, float], dict[str, float]], Told] | None = None  # from values and stds by name
     name_in_result: str = ""  # of the first parameter, where ``tell`` is not given
     build: Build | None = None  # where the effect changes more than numbers
-    #: Start states that suit the changed model, from a fit without it
+    #: Start states, or a body, that suit the changed model, from a fit without it
     settle: Callable[[Problem, Point, Evaluation], Point] | None = None
     experiment: str = ""  # what would tell it from its rivals
 

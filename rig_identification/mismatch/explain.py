@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rig_identification.estimate.cautious import solve_cautiously
-from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit, settled_starts
 from rig_identification.estimate.identify import (
@@ -21,12 +19,14 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
-from rig_identification.estimate.verdict import loudest
+from rig_identification.estimate.verdict import loudest, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
-from rig_identification.mismatch.findings import finding
-from rig_identification.mismatch.locate import Event, find_event
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
+from rig_identification.mismatch.findings import finding, rival
+from rig_identification.mismatch.push import without_push
 from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import (
+    CHIEF,
     MOST_EFFECTS,
     Trial,
     adopted,
@@ -37,35 +37,20 @@ from rig_identification.mismatch.search import (
     strength,
     trials,
 )
-from rig_identification.mismatch.slack import Spell, slack_finding, slack_spells, taut_stretches
-from rig_identification.mismatch.unknown import push_finding, unknown_finding
+from rig_identification.mismatch.slack import Spell, taut_ideal, with_slack
+from rig_identification.mismatch.unknown import unknown_finding
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
 
 #: Mean square of whitened residuals up to which short pieces count as explained.
 EXPLAINED = 1.3
+#: Mean square of whole runs' residuals that refutes what short pieces agreed to.
+WRONG = 3.0
 #: Share of the excess that named effects must take away to be told where something is left.
 CONVINCING = 0.95
-#: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
-#: model of a swinging liquid or a dry hinge is perfect.
-TRACE, TRACE_SQUARE = 0.01, 1.03
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
 FIRM = 10.0
-#: How uneven pieces must be (worst over median mean square) for an event to be looked for.
-UNEVEN = 4.0
-#: What is cut off on either side of a push, s.
-MARGIN = 0.15
-
-
-@dataclass(frozen=True)
-class Explained:
-    """A fit with effects in it; beside it the cautious fit of the ideal model where that was needed."""
-
-    fitted: Fitted
-    mismatch: Mismatch
-    ideal: Ideal
-    loose: float = 1.0  # factor on every variance where a trace is left
 
 
 @dataclass
@@ -87,26 +72,25 @@ class _Search:
         return len(self.here.runs) == len(self.problem.runs)
 
 
-def explain(ideal: Ideal, notify: Notify) -> Explained | None:
+def explain(ideal: Ideal, spells: list[Spell], notify: Notify) -> Explained | None:
     """Search for what the ideal model leaves out; None where every residual is noise.
 
     Near the noise the search looks at whole runs, which say most; where the ideal model fails by
-    far, at short pieces, in which no model is far off.
+    far, at short pieces, in which no model is far off. spells: in which a cable carries nothing (slack.py).
     """
     if ideal.mismatch.verdict == "none":
         # What hides within noise is no finding
         return None
-    spells = _spells(ideal.fitted)
     if not spells:
         return _explain(ideal, notify)
     notify("search: stretches in which every cable pulls", 0.02)
-    taut = _taut(ideal, spells)
+    taut = taut_ideal(ideal, spells, notify)
     if taut is None:
         return _explain(ideal, notify)
     found = None
     if near_noise(taut.fitted):
         found = _explain(taut, notify)
-    return _with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
+    return with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
 
 
 def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
@@ -123,7 +107,7 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
     if evaluation is None:
         return None
     search = _Search(problem, here, evaluation, excess(evaluation))
-    pushed = _pushed(ideal, search, notify)
+    pushed = None if search.whole else without_push(ideal, problem, here, evaluation, notify)
     if pushed is not None:
         return pushed
     best = _named(ideal, search, notify)
@@ -132,48 +116,11 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
     return _unexplained(ideal, search, best, notify)
 
 
-def _spells(fitted: Fitted) -> list[Spell]:
-    zeros = [p.prior_std for p in fitted.problem.bench.parameters.free if p.name.endswith("load_cell_zero")]
-    runs = (*fitted.problem.runs, *fitted.holdout_runs)
-    return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
-
-
-def _taut(ideal: Ideal, spells: list[Spell]) -> Ideal | None:
-    """The ideal model fitted between the spells, from where nothing is bent; None where nothing is left."""
-    fitted = ideal.fitted
-    runs = tuple(part for run in fitted.problem.runs for part in taut_stretches(run, spells))
-    held = tuple(part for run in fitted.holdout_runs for part in taut_stretches(run, spells))
-    if not runs:
-        return None
-    problem = replace(fitted.problem, runs=runs)
-    point = fitted.guess or fitted.evaluation.point
-    pieces, start = in_pieces(problem, point.theta, fitted.rest, point.rest_guesses)
-    careful = solve_cautiously(pieces, start)
-    again = fit_whole(replace(fitted, holdout_runs=held), problem, pieces, careful[1].point)
-    found = Ideal(again, *judged(again))
-    return found if near_noise(again) else replace(found, pieces=pieces, careful=careful)
-
-
-def _with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
-    """What was found between the spells, and the spells."""
-    before, after = ideal.scores.holdout, judged(found.fitted)[0].holdout
-    evidence = {
-        "log_likelihood_gain": float(ideal.fitted.evaluation.cost - found.fitted.evaluation.cost),
-        "holdout_error_before": before,
-        "holdout_error_after": after,
-    }
-    slack = replace(slack_finding(spells), evidence=evidence)
-    mismatch = found.mismatch
-    if mismatch.verdict == "none":
-        text = f"Where every cable pulls every residual is noise. {_errors(before, after)}"
-        mismatch = Mismatch("explained", text, (), ())
-    return replace(found, mismatch=replace(mismatch, findings=(slack, *mismatch.findings)))
-
-
 def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
     """Effects of the catalogue, one after the other, until the whole runs are explained."""
     candidates = catalogue(search.problem)
     best: Explained | None = None
+    fallback: Explained | None = None
     for step in range(MOST_EFFECTS):
         left = [c for c in candidates if c.label not in {t.candidate.label for t in search.found}]
         at = (step + 0.5) / (MOST_EFFECTS + 1)
@@ -189,29 +136,29 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
             break
         first = tried.done[0]
         search.found.append(first)
-        search.rivals += [_rival(t, first) for t in tried.done[1:]]
+        search.rivals += [rival(t, first) for t in tried.done[1:]]
         search.here, search.evaluation = adopted(search.here, search.evaluation, first)
         if not search.whole:
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         if misfit(search.evaluation) > EXPLAINED:
+            if search.share < CHIEF:
+                # Two effects take nearly all away only where the first takes the larger part
+                break
             # Something large is left: there is no use yet in whole runs
             continue
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = _whole(ideal, search)
-        if best.mismatch.verdict == "explained":
+        if best.mismatch.verdict == "explained" and not best.trace:
             return _pruned(best, search, len(candidates))
+        if best.mismatch.verdict == "explained":
+            # All but a trace: a second effect may be that trace, or nothing better is found
+            fallback = best
         if near_noise(best.fitted):
             search.here, search.evaluation = best.fitted.problem, best.fitted.evaluation
-    return best
-
-
-def _rival(trial: Trial, first: Trial) -> dict[str, object]:
-    return {
-        "effect": trial.candidate.effect,
-        "where": dict(trial.candidate.where),
-        "log_likelihood_gap": float(first.evidence - trial.evidence),
-        "experiment": trial.candidate.experiment or first.candidate.experiment,
-    }
+        elif misfit(best.fitted.evaluation) > WRONG and first.candidate.build is not None:
+            # Short pieces bend to anything that swings; what whole runs refute is no base to go on from
+            break
+    return fallback or best
 
 
 def _whole(ideal: Ideal, search: _Search) -> Explained:
@@ -226,12 +173,13 @@ def _fitted_whole(
     point = replace(known, theta=carried(whole, here, known).theta)
     fitted = fit_whole(ideal.fitted, whole, here, point)
     after, verdict = judged(fitted)
-    share = excess(fitted.evaluation) / max(excess(ideal.fitted.evaluation), 1.0)
-    trace = fitted.converged and share < TRACE and misfit(fitted.evaluation) < TRACE_SQUARE
-    loose = loudest(fitted) if trace and verdict.verdict != "none" else 1.0
+    # What the ground scale contradicts is no trace, though it is one number among a hundred thousand
+    trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None
+    trace = trace and only_a_trace(ideal.fitted, fitted)
+    loose = loudest(fitted) if trace else 1.0
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = ", ".join(f.effect for f in findings)
-    errors = _errors(ideal.scores.holdout, after.holdout)
+    errors = held_out_errors(ideal.scores.holdout, after.holdout)
     if verdict.verdict == "none":
         told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
     elif trace:
@@ -239,7 +187,7 @@ def _fitted_whole(
     else:
         told = "unexplained"
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
-    return Explained(fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose)
+    return Explained(fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace)
 
 
 def _pruned(best: Explained, search: _Search, count: int) -> Explained:
@@ -250,12 +198,7 @@ def _pruned(best: Explained, search: _Search, count: int) -> Explained:
         fitted = best.fitted
         here = [replace(t, problem=fitted.problem, evaluation=fitted.evaluation) for t in kept]
         strengths = [
-            # What swings or gives way has states of its own: no small thing to take back
-            np.inf
-            if t.candidate.build is not None
-            else strength(t) / needed_gain(t.candidate, count)
-            if beyond_doubt(t, ordinary, ORDINARY)
-            else 0.0
+            strength(t) / needed_gain(t.candidate, count) if beyond_doubt(t, ordinary, ORDINARY) else 0.0
             for t in here
         ]
         for i in np.argsort(strengths):
@@ -276,75 +219,23 @@ def _findings(
 ) -> tuple[Finding, ...]:
     """The effects in the recording contract's words. loose: factor on their variances."""
     parameters = parameter_estimates(fitted.problem, fitted.evaluation)
-    gain = ideal.fitted.evaluation.cost - fitted.evaluation.cost
+    evidence = evidence_of(ideal, fitted, after)
     values = {p.name: p.value for p in parameters}
     # An error beyond what is ordinary comes on top of an ordinary one, and only their sum is seen
     ordinary = {p.name: p.prior_std for p in ideal.fitted.problem.bench.parameters.free}
     stds = {p.name: float(np.sqrt(loose * p.std**2 + ordinary.get(p.name, 0.0) ** 2)) for p in parameters}
-    return tuple(finding(t, values, stds, gain, ideal.scores.holdout, after) for t in found)
-
-
-def _errors(before: float | None, after: float | None) -> str:
-    def number(value: float | None) -> str:
-        return "not known" if value is None else f"{value:.3g}"
-
-    return f"Held-out error {number(before)} before, {number(after)} after (1 is a perfect model)."
-
-
-def _pushed(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
-    """The session without the seconds in which something pushed; None where nothing did, or more is wrong."""
-    squares = [float(np.mean(run.residual**2)) for run in search.evaluation.runs]
-    if search.whole or max(squares) < UNEVEN * float(np.median(squares)):
-        return None
-    notify("search: a push", 0.05)
-    event = find_event(search.here, search.evaluation)
-    if event is None:
-        return None
-    mass = mass_of(search.here, search.evaluation)
-    at = replace(search.evaluation, point=event.point)
-    told = push_finding(search.here, at, ideal.fitted.rest, mass, event)
-    if told is None:
-        return None
-    push, start, end = told
-    parts = tuple(part for run in search.problem.runs for part in _without(run, event, start, end))
-    whole = replace(search.problem, runs=parts)
-    fitted = fit_whole(ideal.fitted, whole, search.here, event.point)
-    after, verdict = judged(fitted)
-    if verdict.verdict != "none":
-        return None
-    evidence = {
-        "log_likelihood_gain": float(ideal.fitted.evaluation.cost - fitted.evaluation.cost),
-        "holdout_error_before": ideal.scores.holdout,
-        "holdout_error_after": after.holdout,
-    }
-    text = f"Outside the push every residual is noise. {_errors(ideal.scores.holdout, after.holdout)}"
-    return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
-
-
-def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
-    """A run's stretches before and after a push, where they are long enough to say something."""
-    if run.recording.name != event.recording:
-        return [run]
-    step = run.grid.step
-    a = round((start - MARGIN - run.offset) / step)
-    b = round((end + MARGIN - run.offset) / step)
-    out = []
-    if a * step > 1.0:
-        out.append(run.between(0, a))
-    if (run.grid.nodes - 1 - b) * step > 1.0:
-        out.append(run.between(b, run.grid.nodes - 1))
-    return out
+    return tuple(finding(t, values, stds, evidence) for t in found)
 
 
 def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: Notify) -> Explained:
     """What is told where something is left: named effects only where they take nearly all of it away."""
     convincing = bool(search.found) and search.share > CONVINCING and misfit(search.evaluation) < EXPLAINED**2
     ideal = with_pieces(ideal, notify)
-    notify("search: the missing wrench", 0.95)
-    unknown = _unknown(ideal, search)
     if convincing and best is None:
         best = _whole(ideal, search)
-    if convincing and best is not None:
+    notify("search: the missing wrench", 0.95)
+    here, evaluation = search.here, search.evaluation
+    if convincing and best is not None and misfit(best.fitted.evaluation) < WRONG:
         kept: tuple[Finding, ...] = best.mismatch.findings
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:
@@ -357,20 +248,23 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
         if partly:
             named = ", ".join(str(p["effect"]) for p in partly)
             explanation += f" {named} would take away a part of it, which does not convince."
-    before = ideal.scores.holdout
-    evidence = {"log_likelihood_gain": 0.0, "holdout_error_before": before, "holdout_error_after": before}
+        if search.found and ideal.pieces is not None and ideal.careful is not None:
+            # What is not told must not take part of the missing wrench away
+            pieces = with_reference(ideal.pieces, ideal.fitted.rest)
+            here, evaluation = pieces, evaluate(pieces, ideal.careful[1].point) or evaluation
+    unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
+    evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
     return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal)
 
 
-def _unknown(ideal: Ideal, search: _Search) -> Finding | None:
-    """A stand-in for what is left, seen in short pieces."""
-    here, evaluation = search.here, search.evaluation
-    if search.whole:
+def _unknown(ideal: Fitted, here: Problem, evaluation: Evaluation, liar: str | None) -> Finding | None:
+    """A stand-in for what ``evaluation`` leaves, seen in short pieces."""
+    if len(here.runs) == len(ideal.problem.runs):
         point = evaluation.point
-        here, start = in_pieces(here, point.theta, ideal.fitted.rest, point.rest_guesses)
+        here, start = in_pieces(here, point.theta, ideal.rest, point.rest_guesses)
         again = evaluate(here, replace(start, starts=settled_starts(here, start)))
         if again is None:
             return None
         evaluation = again
-    return unknown_finding(here, evaluation, ideal.fitted.rest, mass_of(here, evaluation), search.liar)
+    return unknown_finding(here, evaluation, ideal.rest, mass_of(here, evaluation), liar)

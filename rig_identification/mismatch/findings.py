@@ -10,21 +10,20 @@ def finding(
     trial: Trial,
     values: dict[str, float],
     stds: dict[str, float],
-    gain: float,
-    before: float | None,
-    after: float | None,
+    evidence: dict[str, float | None],
 ) -> Finding:
     """The finding that a trial's effect amounts to.
 
-    values, stds: of all parameters of the whole fit by name. gain: nats. before, after: held-out errors.
+    values, stds: of all parameters of the whole fit by name. evidence: see explained.evidence_of.
     """
     candidate = trial.candidate
     told = candidate.told(values, stds)
     first = next(iter(told.values()))
     shown = f"{first[0]:.4g} ± {first[1]:.2g}" + ("" if first[2] == "1" else f" {first[2]}")
     where = dict(candidate.where)
-    if candidate.effect == "tether":
-        where["position"] = [values[f"tether.point.{a}"] for a in "xyz"]
+    for place in (f"{candidate.effect}.point", f"{candidate.effect}.position"):
+        if f"{place}.x" in values:
+            where["position"] = [float(values[f"{place}.{a}"]) for a in "xyz"]
     if candidate.effect == "imu_misalignment":
         where["axis"] = max("xyz", key=lambda a: abs(told[f"angle_{a}"][0]))
     sentence = candidate.sentence.format(value=shown, channel=where.get("channel"))
@@ -32,10 +31,16 @@ def finding(
         candidate.effect,
         where,
         {name: {"value": float(v), "std": float(s), "unit": unit} for name, (v, s, unit) in told.items()},
-        {
-            "log_likelihood_gain": float(gain),
-            "holdout_error_before": None if before is None else float(before),
-            "holdout_error_after": None if after is None else float(after),
-        },
+        dict(evidence),
         f"{sentence} {candidate.advice}",
     )
+
+
+def rival(trial: Trial, first: Trial) -> dict[str, object]:
+    """An entry of ``alternatives``: a hypothesis that the likeliest one, ``first``, beat."""
+    return {
+        "effect": trial.candidate.effect,
+        "where": dict(trial.candidate.where),
+        "log_likelihood_gap": float(first.evidence - trial.evidence),
+        "experiment": trial.candidate.experiment or first.candidate.experiment,
+    }

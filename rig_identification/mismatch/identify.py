@@ -7,9 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig_identification.estimate.identify import compose, fit_ideal, only_watched, scores, with_pieces
+from rig_identification.estimate.identify import (
+    Assumed,
+    Ideal,
+    compose,
+    fit_session,
+    judged,
+    near_noise,
+    only_watched,
+    scores,
+    with_pieces,
+)
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.explain import explain
+from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.watched import explain_watched
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, Identification
@@ -20,9 +31,12 @@ Progress = Callable[[str, float], None]
 IDEAL_SHARE = 0.4
 
 
-def identify(session: Session, progress: Progress | None = None) -> Identification:
+def identify(
+    session: Session, progress: Progress | None = None, assumed: Assumed | None = None
+) -> Identification:
     """Mass, centre of mass and inertia tensor, with whatever the ideal model leaves out found and modelled.
 
+    assumed: what another ideal model than this project's assumes, the thesis' for one.
     ``figures["ideal"]`` of the result holds the ideal model's own answer where effects were found.
 
     Raises InputError where the session holds nothing to fit.
@@ -35,7 +49,14 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     def searching(stage: str, fraction: float) -> None:
         notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
 
-    ideal = fit_ideal(session, lambda stage, fraction: notify(stage, IDEAL_SHARE * fraction))
+    def fitting(stage: str, fraction: float) -> None:
+        notify(stage, IDEAL_SHARE * fraction)
+
+    fitted = fit_session(session, fitting, assumed)
+    ideal = Ideal(fitted, *judged(fitted))
+    spells = spells_of(fitted)
+    if not spells and not near_noise(fitted):
+        ideal = with_pieces(ideal, fitting)
     plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
     if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
         ideal = with_pieces(ideal, searching)
@@ -53,7 +74,7 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
-            found = explain(ideal, searching)
+            found = explain(ideal, spells, searching)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
     if found is None:

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
+from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter, ParameterSet
+from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import layout
+from rig_identification.model.body import (
+    can_exist,
+    elements_from_linear,
+    linear_from_log_cholesky,
+    log_cholesky_from_linear,
+    point_inertia,
+    six_elements,
+)
 from rig_identification.model.effects import place
 from rig_identification.rig import Rig
+
+#: Length (m) of a hose that pulls as hard as any would and resists sideways most.
+SHORT_HOSE = 1.0
 
 
 def _added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -> Parameter:
@@ -19,7 +33,11 @@ def _added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -
 def _tether(
     axes: str, block: int, mass: float, gravity: float, length: float, size: float, middle: np.ndarray
 ) -> Candidate:
-    """A tether that pulls along ``axes``: along one as a taut hose does, along all as one that hangs."""
+    """A tether that pulls along ``axes``: along one as a taut hose does, along all as one that hangs.
+
+    What is taut resists sideways as well, by its pull over its length F0/l alike to both sides: too little to
+    show by itself, and enough to stand for a centre of mass that lies millimetres higher.
+    """
     spring, pull = 0.2 * mass * gravity / length, 0.02 * mass * gravity
     parts = [
         _added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
@@ -29,6 +47,10 @@ def _tether(
         )
         for a in axes
     ]
+    if len(axes) == 1:
+        first, second = (block + place.TETHER_STIFFNESS + i for i, a in enumerate(AXES) if a != axes)
+        aside = _added("tether.sideways", "N/m", pull / SHORT_HOSE, first)
+        parts.append(replace(aside, also=(second,)))
     parts += [
         _added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
         for i, a in enumerate(AXES)
@@ -39,9 +61,9 @@ def _tether(
         main = max(stiff, key=lambda a: abs(stiff[a]))
         out: Told = {"stiffness": (stiff[main], stds[f"tether.stiffness.{main}"], "N/m")}
         for p in parts:
-            _, what, a = p.name.split(".")
+            _, what, *a = p.name.split(".")
             if what == "point" or len(axes) > 1:
-                out[f"{what}_{a}"] = (values[p.name], stds[p.name], p.unit)
+                out["_".join([what, *a])] = (values[p.name], stds[p.name], p.unit)
             elif what == "pull":
                 out["preload"] = (abs(values[p.name]), stds[p.name], p.unit)
         return out
@@ -132,7 +154,40 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
                 {"channel": "exciter", "axis": None},
                 positive=1,
                 name_in_result="rotor_mass",
+                settle=_less_the_rotor,
             )
         )
-    _ = parameters
+    if parameters.model.physics[block + place.GYROSCOPIC_SHARE] != 0.0:
+        out.append(_gyroscopic_term(block, float(parameters.model.physics[block + place.GYROSCOPIC_SHARE])))
     return out
+
+
+def _less_the_rotor(problem: Problem, point: Point, evaluation: Evaluation) -> Point:
+    """The body without the rotor that a fit without one holds in it: together they move as that fit does."""
+    _ = evaluation
+    parameters = problem.bench.parameters
+    values = dict(zip((p.name for p in parameters.free), parameters.values(point.theta), strict=True))
+    mass, at = values["exciter.rotor_mass"], layout.EXCITER_POSITION
+    mount = parameters.physics(point.theta)[at : at + 3]
+    rotor = np.array([mass, *(mass * mount), *six_elements(point_inertia(mass, mount))])
+    alone = linear_from_log_cholesky(point.theta[:INERTIAL]) - rotor
+    if not can_exist(elements_from_linear(alone)):
+        return point
+    return replace(point, theta=np.concatenate([log_cholesky_from_linear(alone), point.theta[INERTIAL:]]))
+
+
+def _gyroscopic_term(block: int, lacking: float) -> Candidate:
+    """The gyroscopic moment, where the ideal model lacks a share of it: in nature none is missing."""
+    share = _added("gyroscopic_share", "1", 1.0, block + place.GYROSCOPIC_SHARE, lacking)
+
+    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+        return {"share": (1.0 - values[share.name], stds[share.name], "1")}
+
+    return Candidate(
+        "gyroscopic_term",
+        (share,),
+        "The body's own rotation turns its angular momentum: {value} of the moment w x (J w) acts.",
+        "Keep the gyroscopic term in the equations.",
+        {"channel": None, "axis": None},
+        tell=told,
+    )

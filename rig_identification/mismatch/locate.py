@@ -18,6 +18,8 @@ from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem
 SILENT = 300.0
 #: Share of the excess that has to go with a device for it to be the one that lies.
 GONE = 0.97
+#: Mean square of the other devices' residuals up to which they agree.
+AGREED = 1.15
 #: Steps of such a fit.
 STEPS = 6
 
@@ -34,7 +36,7 @@ class Liar:
 def devices_of(problem: Problem) -> list[str]:
     """Devices whose readings, or force, the runs hold."""
     found = {c.device: None for run in problem.runs for c in run.channels}
-    exciter = ["exciter"] if any(run.exciter is not None for run in problem.runs) else []
+    exciter = ["exciter"] if any(run.force is not None for run in problem.runs) else []
     return [*found, *exciter]
 
 
@@ -60,6 +62,30 @@ def silenced(problem: Problem, device: str) -> Problem:
     return replace(problem, runs=tuple(runs), rests=rests)
 
 
+#: Share of the excess that has to go with a device to first order for its fit to be tried.
+GONE_LINEARLY = 0.6
+
+
+def _gone_with(problem: Problem, evaluation: Evaluation, device: str) -> float:
+    """Share of the excess that goes with a device to first order: its rows are left out, all else moves."""
+    size = problem.bench.parameters.size
+    information, gradient = evaluation.information.copy(), evaluation.gradient.copy()
+    left, place_ = 0.0, size
+    for run, part in zip(evaluation.runs, problem.runs, strict=True):
+        starts = run.jacobian.shape[1] - size
+        columns = np.concatenate([np.arange(size), np.arange(place_, place_ + starts)])
+        place_ += starts
+        mine = np.array([c.device == device for c in part.channels])[run.channel]
+        rows = run.jacobian[mine]
+        information[np.ix_(columns, columns)] -= rows.T @ rows
+        gradient[columns] -= rows.T @ run.residual[mine]
+        left += 0.5 * float(np.sum(run.residual[~mine] ** 2) - np.count_nonzero(~mine))
+    # What only the device told moves no more than the silenced device lets it
+    information += 1e-9 * np.diag(np.diag(evaluation.information))
+    won = 0.5 * float(gradient @ np.linalg.lstsq(information, gradient, rcond=1e-14)[0])
+    return 1.0 - max(0.0, left - won) / max(excess(evaluation), 1.0)
+
+
 def find_liar(problem: Problem, evaluation: Evaluation) -> Liar | None:
     """The device without which the others agree best, where nearly all excess goes with it."""
     devices = devices_of(problem)
@@ -67,6 +93,9 @@ def find_liar(problem: Problem, evaluation: Evaluation) -> Liar | None:
         return None
     best: Liar | None = None
     for device in devices:
+        # The force is no row, it drives everything: only a fit tells
+        if device != "exciter" and _gone_with(problem, evaluation, device) < GONE_LINEARLY:
+            continue
         try:
             fitted, _ = solve(
                 silenced(problem, device), evaluation.point, iterations=STEPS, tolerance=0.5, polish=POLISH
@@ -80,7 +109,7 @@ def find_liar(problem: Problem, evaluation: Evaluation) -> Liar | None:
         rest = np.concatenate(heard)
         if excess(fitted) < (1.0 - GONE) * excess(evaluation):
             left = float(np.mean(rest**2))
-            if best is None or left < best.left:
+            if left < AGREED and (best is None or left < best.left):
                 best = Liar(device, fitted.point, left)
     return best
 

@@ -18,13 +18,18 @@ from scipy.linalg import cho_factor, cho_solve
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import SWINGS, WIDTH, middle_of, rider_candidate, rider_wrenches
-from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, largest_compliance
+from rig_identification.mismatch.supports import (
+    cable_elasticity,
+    ceiling_candidate,
+    gives_way,
+    largest_compliance,
+)
 from rig_identification.model.effects import place
-from rig_identification.model.layout import RIGID, effects_offset
+from rig_identification.model.layout import effects_offset
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -37,6 +42,7 @@ class Promise:
     candidate: Candidate
     gain: float  # nats
     values: dict[str, float]  # its parameters, in their own units
+    share: float = 0.0  # of what the ideal model leaves, to first order, that it takes away
 
 
 def with_reference(problem: Problem, rest: State) -> Problem:
@@ -87,8 +93,8 @@ def screen(
     mass: kg, of the body.
     """
     rig, model = problem.bench.rig, problem.bench.parameters.model
-    rigid = model.internal == 0 and bool(np.all(model.modes == RIGID))
-    probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in range(3)] if rigid else []
+    axes = () if gives_way(model) else range(3)
+    probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in axes]
     wide = _adding(problem, [*candidates, *probes])
     point = carried(wide, problem, evaluation.point)
     full = evaluate(wide, point)
@@ -100,6 +106,8 @@ def screen(
     for probe in (_promise(wide, point, full, base, c) for c in probes):
         out += _supports(problem, mass, probe)
     out += _riders(problem, full, base, wide.bench.parameters.size, mass)
+    left = max(1.0, excess(full) - _gain(full.information, full.gradient, base))
+    out = [replace(promise, share=promise.gain / left) for promise in out]
     return sorted(out, key=lambda promise: -promise.gain)
 
 
@@ -168,7 +176,8 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
     if axis == 2:
         length = float(np.mean([c.length for c in rig.cables]))
         stiffness = length / (compliance * model.cables)
-        out.append(Promise(cable_elasticity(rig, model, mass, stiffness), probe.gain, {}))
+        elasticity = cable_elasticity(rig, model, mass)
+        out.append(Promise(elasticity, probe.gain, {"cable.axial_stiffness": stiffness}))
     return out
 
 
@@ -202,7 +211,7 @@ def _riders(
     # Columns of a mass at the middle, and of its distance from there
     about = np.eye(WIDTH)
     about[1:, 0] = center
-    best: dict[str, Promise] = {}
+    best: dict[tuple[str, str], Promise] = {}
     for k, swing in enumerate(SWINGS):
         chosen = slice(WIDTH * k, WIDTH * (k + 1))
         matrix = about.T @ (own[k] - seen[:, chosen].T @ solved[:, chosen]) @ about
@@ -213,12 +222,16 @@ def _riders(
         prior = np.diag([1.0 / (0.05 * mass) ** 2] + [1.0 / (alone * far) ** 2] * 3)
         step = np.linalg.lstsq(matrix + prior, right, rcond=1e-12)[0]
         gain = 0.5 * float(step @ right)
-        if step[0] <= 0.0 or (swing.directions in best and gain <= best[swing.directions].gain):
+        kind = swing.effect, swing.directions
+        if step[0] <= 0.0 or (kind in best and gain <= best[kind].gain):
             continue
         at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
         candidate, values = rider_candidate(problem, swing, mass, float(step[0]), at)
-        best[swing.directions] = Promise(candidate, gain, values)
-    return list(best.values())
+        best[kind] = Promise(candidate, gain, values)
+    swinging = max((p.gain for (effect, _), p in best.items() if effect != "loose_mass"), default=0.0)
+    # Blows against stops look like nothing else: where what swings smoothly promises more nothing is loose,
+    # and the slowest fit of all is saved
+    return [p for (effect, _), p in best.items() if effect != "loose_mass" or p.gain > swinging]
 
 
 def _solve(information: Array, gradient: Array) -> Array:

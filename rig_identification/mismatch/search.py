@@ -10,15 +10,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
-from rig_identification.estimate.growing import NEAR_SQUARE, misfit, settled_starts
+from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import AXES, INERTIAL
-from rig_identification.estimate.solve import POLISH, Evaluation, Problem, evaluate, excess, solve
+from rig_identification.estimate.solve import (
+    POLISH,
+    Evaluation,
+    Point,
+    Problem,
+    evaluate,
+    excess,
+    shortened,
+    solve,
+)
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.left_out_physics import left_out_physics
@@ -27,8 +38,13 @@ from rig_identification.mismatch.riders import SWINGS, Swing, rider_candidate
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.sensor_errors import sensor_errors
-from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, largest_compliance
-from rig_identification.model.layout import RIGID
+from rig_identification.mismatch.supports import (
+    cable_elasticity,
+    ceiling_candidate,
+    gives_way,
+    largest_compliance,
+    usual_stiffness,
+)
 
 Array = NDArray[np.float64]
 Notify = Callable[[str], None]
@@ -37,8 +53,13 @@ Notify = Callable[[str], None]
 FALSE_ALARM = 0.005
 #: Hypotheses fitted in full after each screening, and effects looked for at most.
 FITTED = 4
+#: Of these, at most so many of one effect: its other places are its rivals anyway.
+ALIKE = 3
+#: Share of what is left that a promise has to take for its fit to come before any other doubt.
+DIRECT = 0.8
 MOST_EFFECTS = 2
-#: A promise this much (nats) behind the best is not worth a fit, in parts of the best.
+#: A promise this much (nats) behind the best is not worth a fit, in parts of the best; nor is what gives way
+#: where trying its amounts takes away no larger part of what is left.
 WORTH = 0.05
 #: Pieces that hypotheses are tried on.
 TRIED = 4
@@ -52,14 +73,34 @@ VERY_FAR = 5.0
 #: a hypothesis may have left after its first steps to be its rival even so.
 AT_NOISE = 1.05
 RIVAL = 10.0
+#: Share of what was left up to which a hypothesis, after its first steps, is fitted to its end at once.
+ALMOST = 0.05
+#: Share of what is left that counts as the larger part of it.
+CHIEF = 0.5
+#: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
+SEEN = 4.0
+#: Near the noise: log evidence by which a hypothesis is beaten for good, and the share of what another one
+#: won that its promise must come to.
+BEATEN = 30.0
+CLOSE = 0.7
 #: Steps of a first, short fit (more where the model itself changes) and of one to the end, and how many
 #: hypotheses get that far.
 FIRST_STEPS = 4
-CHANGED_STEPS = 9
+CHANGED_STEPS = 7
 LAST_STEPS = 20
+#: Share of their prior's std within which such ratios are held at first.
+HELD = 0.05
 FINISHED = 3
-#: Frequency (Hz) at which a body bounces on its cables where a fit of their stretch starts.
-BOUNCE = 12.0
+#: Ends (s) of the first horizons over which a changed model is fitted.
+HORIZONS = (0.4, 1.2)
+#: Std of its prior that a fit starts away from at most, and parts of the largest compliance of a ceiling that
+#: are tried where the probe says nothing.
+FARTHEST = 3.0
+SINKS = (0.03, 0.1, 0.3, 0.7)
+#: Multiples of the usual stiffness of cables that are tried first: thin wire to thick rope.
+STRETCHES = (0.1, 0.3, 1.0, 3.0, 10.0)
+#: Factor between two of them.
+SPACED = 3.0
 
 
 @dataclass(frozen=True)
@@ -147,35 +188,86 @@ def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Pro
 def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial | None:
     """A first, short fit of one hypothesis from what screening promised; None where it cannot start."""
     candidate = promise.candidate
+    # Blows have no second derivative to follow
+    bends = candidate.build is not None and candidate.effect != "loose_mass"
     wide = extended(problem, (candidate,))
-    point = carried(wide, problem, evaluation.point)
-    theta = point.theta.copy()
-    for k, p in enumerate(candidate.built(problem.bench.parameters.model)[1]):
-        if p.name not in promise.values:
-            continue
-        i = wide.bench.parameters.index_of(p.name)
-        theta[i] = float(np.clip(p.position(promise.values[p.name]), -1.0, 1.0))
-        if k < candidate.positive:
-            theta[i] = max(theta[i], 0.0)
-    if candidate.settle is not None:
-        point = candidate.settle(wide, replace(point, theta=theta), evaluation)
-    point = replace(point, theta=theta)
+    begun = carried(wide, problem, evaluation.point)
+    point = _promised(wide, begun, candidate, promise.values, evaluation)
     try:
         if candidate.build is not None:
-            # A changed model throws the start states out first, and everything else would bend to that
-            point = replace(point, starts=settled_starts(wide, point))
+            point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE)
         steps = FIRST_STEPS if candidate.build is None else CHANGED_STEPS
-        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5, polish=POLISH)
+        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=bends)
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+
+
+def _promised(
+    problem: Problem, point: Point, candidate: Candidate, values: dict[str, float], evaluation: Evaluation
+) -> Point:
+    """The point with ``values`` of a hypothesis that is in the model, in their own units."""
+    theta = point.theta.copy()
+    for k, p in enumerate(candidate.parameters):
+        if p.name not in values:
+            continue
+        i = problem.bench.parameters.index_of(p.name)
+        free = problem.bench.parameters.free[i - INERTIAL]
+        theta[i] = float(np.clip(free.position(values[p.name]), -FARTHEST, FARTHEST))
+        if k < candidate.positive:
+            theta[i] = max(theta[i], 0.0)
+    point = replace(point, theta=theta)
+    return point if candidate.settle is None else candidate.settle(problem, point, evaluation)
+
+
+def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool) -> Point:
+    """The point from where a fit of a changed model to all of its runs starts.
+
+    A changed model throws the start states out first, and its amount comes before its other ratios. Where
+    much is left (far) it is fitted over the first instants before: what stretches or yields rings at tens of
+    hertz, over some seconds a stiffness a percent off is half a turn out of step, and everything else bends
+    to that (growing.py). Near the noise first order is about right, and short horizons tell nothing.
+    """
+    if not far:
+        return _with_amount(problem, candidate, replace(point, starts=settled_starts(problem, point)))
+    for end in HORIZONS:
+        part = held_over(problem, end, point.theta[:INERTIAL].copy())
+        point = replace(point, starts=settled_starts(part, point))
+        if end == HORIZONS[0]:
+            point = _with_amount(part, candidate, point)
+        fitted, _ = solve(part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, bends=True)
+        point = fitted.point
+    return replace(point, starts=settled_starts(problem, point))
+
+
+def _with_amount(problem: Problem, candidate: Candidate, point: Point) -> Point:
+    """The point after a few steps in which an effect's amount moves and its other ratios are held.
+
+    How much there is of an effect shows at any frequency or damping of its own; these make sense only of
+    about the right amount, and run far away before.
+    """
+    parameters = problem.bench.parameters
+    own = {p.name for p in candidate.parameters[1:]}
+    held = tuple(
+        replace(p, prior_std=HELD * p.prior_std) for p in parameters.free if p.ratio and p.name in own
+    )
+    narrow = replace(problem, bench=replace(problem.bench, parameters=parameters.having(held)))
+    fitted, _ = solve(
+        narrow, carried(narrow, problem, point), iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH
+    )
+    return carried(problem, narrow, fitted.point)
 
 
 def finished(trial: Trial) -> Trial | None:
     """The trial fitted to its end; None where its sign makes no sense there."""
     if not trial.settled:
         fitted, _ = solve(
-            trial.problem, trial.evaluation.point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH
+            trial.problem,
+            trial.evaluation.point,
+            iterations=LAST_STEPS,
+            tolerance=0.05,
+            polish=POLISH,
+            bends=trial.candidate.build is not None,
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
     if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial)):
@@ -222,6 +314,24 @@ def _at_noise(trial: Trial) -> bool:
     return misfit(trial.evaluation) < AT_NOISE
 
 
+def _without_support(tried: list[Trial], before: Evaluation) -> bool:
+    """Whether near the noise there is no need to try what gives way.
+
+    There is none where a hypothesis takes away the larger part of what is left. Where the residuals as a
+    whole show nothing that is, there is only if something that swings, which is alike, is the best.
+    """
+    first = max(tried, key=lambda t: t.evidence, default=None)
+    left, size = excess(before), sum(run.residual.size for run in before.runs)
+    if left < SEEN * np.sqrt(0.5 * size):
+        return first is None or first.candidate.build is None
+    return first is not None and before.cost - first.evaluation.cost > CHIEF * left
+
+
+def _almost(trial: Trial, before: Evaluation) -> bool:
+    """Whether a hypothesis leaves next to nothing of what was left ``before``, and yet more than noise."""
+    return not _at_noise(trial) and excess(trial.evaluation) < ALMOST * excess(before)
+
+
 @dataclass(frozen=True)
 class Trials:
     """Hypotheses fitted in full, most likely first, and the device that contradicts all others."""
@@ -236,52 +346,55 @@ def trials(
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
     All get a few steps; the best few go on to their end, and where one reaches the noise only those
-    that had come as close. Where much is left, what gives way is tried whatever screening
-    says: it is far from linear.
+    that had come as close. Where much is left and no hypothesis takes it away that promised to, first order
+    is not to be trusted: witnesses are then heard one without the other, and what gives way is
+    tried whatever screening says.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
-    liar = None
     if far:
         problem, evaluation = worst_pieces(problem, evaluation)
+    count = len(candidates) + len(SWINGS)
+    promises = screen(problem, evaluation, candidates, mass)
+    here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
+    tried: list[Trial] = []
+    if not far or (promises and promises[0].share > DIRECT):
+        tried = begun(here, seen, _worthy(promises, count), far, notify)
+    device, needed = None, log_evidence(seen) + MEANT
+    if far and not any(_at_noise(t) for t in tried):
+        liar = None
         if problem.bench.parameters.model.internal == 0:
             # With something that swings in the model such fits take minutes
             notify("without each device in turn")
             liar = find_liar(problem, evaluation)
         if liar is not None:
             # About the fit that does not hear it, what is wrong with it shows as it is
-            evaluation = evaluate(problem, liar.point) or evaluation
-            far = False
-    promises = screen(problem, evaluation, candidates, mass)
-    worthy = [p for p in promises if p.gain > needed_gain(p.candidate, len(candidates) + len(SWINGS))]
-    if liar is not None:
-        own = [p for p in worthy if p.candidate.where.get("channel") == liar.device]
-        worthy = own or worthy
-    worthy = [p for p in worthy if p.gain > WORTH * worthy[0].gain][:FITTED]
-    if far:
-        seen = {p.candidate.label for p in worthy}
-        worthy += [p for p in far_promises(problem, promises, mass) if p.candidate.label not in seen]
-    device = None if liar is None else liar.device
-    if not worthy:
+            device = liar.device
+            about = evaluate(problem, liar.point) or seen
+            worthy = _worthy(screen(problem, about, candidates, mass), count, device)
+            tried += begun(here, about, worthy, False, notify)
+        if not any(_at_noise(t) for t in tried):
+            known = {t.candidate.label for t in tried}
+            notify("what gives way")
+            worthy = [p for p in far_promises(here, seen, promises, mass) if p.candidate.label not in known]
+            known |= {p.candidate.label for p in worthy}
+            worthy += [p for p in _worthy(promises, count) if p.candidate.label not in known]
+            tried += begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify)
+    if not far and not _without_support(tried, seen):
+        # Of what rings first order says nothing
+        notify("what gives way")
+        known = {t.candidate.label for t in tried}
+        worthy = [p for p in supports(here, seen, mass) if p.candidate.label not in known]
+        tried += begun(here, seen, _worthy(sorted(worthy, key=lambda p: -p.gain), count), False, notify)
+    if not tried:
         return Trials([], device)
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
-    problem, evaluation = worst_pieces(problem, evaluation)
-    needed = log_evidence(evaluation) + MEANT
-    begun: list[Trial] = []
-    for promise in worthy:
-        notify(promise.candidate.label)
-        trial = attempt(problem, evaluation, promise)
-        if trial is not None:
-            begun.append(trial)
-            if far and _at_noise(trial):
-                # From far off nothing reaches the noise by chance
-                break
-    begun.sort(key=lambda t: -t.evidence)
+    tried.sort(key=lambda t: -t.evidence)
     done: list[Trial] = []
-    for trial in begun:
+    for trial in tried:
         if len(done) == FINISHED:
             break
-        if any(_at_noise(t) for t in done) and excess(trial.evaluation) > RIVAL * excess(begun[0].evaluation):
+        if any(_at_noise(t) for t in done) and _beaten(trial, done, tried[0], far):
             continue
         notify(trial.candidate.label)
         ended = finished(trial)
@@ -290,21 +403,148 @@ def trials(
     return Trials(told_apart(done, MEANT), device)
 
 
-def far_promises(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:
-    """What gives way, and the best rider to one side and to all, whatever screening promises of them."""
+def _worthy(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
+    """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie."""
+    worthy = [p for p in promises if p.gain > needed_gain(p.candidate, count)]
+    if device is not None:
+        worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
+    out: list[Promise] = []
+    for p in worthy:
+        alike = sum(q.candidate.effect == p.candidate.effect for q in out)
+        if p.gain > WORTH * worthy[0].gain and alike < ALIKE and len(out) < FITTED:
+            out.append(p)
+    return out
+
+
+def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
+    """Whether a hypothesis is no rival of those that reached the noise, by its first steps."""
+    if far:
+        return excess(trial.evaluation) > RIVAL * excess(first.evaluation)
+    return trial.evidence < max(t.evidence for t in done) - BEATEN
+
+
+def begun(
+    problem: Problem, evaluation: Evaluation, worthy: list[Promise], far: bool, notify: Notify
+) -> list[Trial]:
+    """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
+    out: list[Trial] = []
+    reached = 0.0
+    for promise in worthy:
+        won = max((evaluation.cost - t.evaluation.cost for t in out), default=0.0)
+        if not far and promise.gain < min(CLOSE * won, won - BEATEN):
+            # Near the noise a promise is about what a fit can win
+            continue
+        if far and promise.candidate.build is not None and promise.gain < CLOSE * reached:
+            # Another hypothesis left nothing already, and much more was expected of it
+            continue
+        notify(promise.candidate.label)
+        trial = attempt(problem, evaluation, promise)
+        if trial is not None and far and _almost(trial, evaluation):
+            # Worth its last steps before any other is tried
+            trial = finished(trial) or trial
+        if trial is not None:
+            out.append(trial)
+            if far and _at_noise(trial):
+                reached = max(reached, promise.gain)
+                if promise is not worthy[0]:
+                    break
+    return out
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of what a change of the model's amount explains, by trying it instead of to first order.
+
+    Where much is left it is tried over the second of HORIZONS, and what that tells is told of all.
+    """
+
+    problem: Problem
+    evaluation: Evaluation
+    candidate: Candidate
+    name: str  # of the parameter that an amount is a value of
+
+    @cached_property
+    def far(self) -> bool:
+        """Whether much is left."""
+        return misfit(self.evaluation) > NEAR_SQUARE
+
+    @cached_property
+    def part(self) -> Problem:
+        """What amounts are tried on."""
+        return shortened(self.problem, HORIZONS[-1]) if self.far else self.problem
+
+    @cached_property
+    def before(self) -> Evaluation | None:
+        """That part without the change."""
+        return evaluate(self.part, self.evaluation.point, residuals_only=True)
+
+    def gain(self, amount: float) -> float:
+        """What ``amount`` explains (nats) with everything else but start states as it is."""
+        wide = extended(self.part, (self.candidate,))
+        start = carried(wide, self.problem, self.evaluation.point)
+        before = self.before
+        try:
+            point = _promised(wide, start, self.candidate, {self.name: amount}, self.evaluation)
+            found = evaluate(wide, replace(point, starts=settled_starts(wide, point)), residuals_only=True)
+        except FloatingPointError:
+            return 0.0
+        if before is None or found is None:
+            return 0.0
+        scale = excess(self.evaluation) / max(1.0, excess(before)) if self.far else 1.0
+        return scale * (before.cost - found.cost)
+
+    def best(self, amounts: list[float]) -> Promise:
+        """The promise of the best of ``amounts``."""
+        gains = [self.gain(amount) for amount in amounts]
+        at = int(np.argmax(gains))
+        return self._promise(amounts[at], gains[at])
+
+    def refined(self, promise: Promise) -> Promise:
+        """The promise with the best amount within a factor of SPACED of its own."""
+        amount = promise.values[self.name]
+        found = minimize_scalar(
+            lambda x: -self.gain(amount * float(np.exp(x))),
+            bounds=(-np.log(SPACED), np.log(SPACED)),
+            method="bounded",
+            options={"xatol": 0.1},
+        )
+        better = self._promise(amount * float(np.exp(found.x)), -float(found.fun))
+        return max(promise, better, key=lambda p: p.gain)
+
+    def _promise(self, amount: float, gain: float) -> Promise:
+        left = max(1.0, excess(self.evaluation))
+        return Promise(self.candidate, max(0.0, gain), {self.name: amount}, max(0.0, gain) / left)
+
+
+def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Promise]:
+    """What gives way, each scanned over its amount; nothing where the model gives way already."""
     rig, model = problem.bench.rig, problem.bench.parameters.model
-    if model.internal or not np.all(model.modes == RIGID):
+    if gives_way(model):
         return []
-    length = float(np.mean([c.length for c in rig.cables]))
-    stiffness = mass * (2.0 * np.pi * BOUNCE) ** 2 * length / model.cables
-    out = [Promise(cable_elasticity(rig, model, mass, stiffness), 0.0, {})]
-    sink = 0.1 * largest_compliance(rig, mass)
-    told = {p.candidate.label: p for p in promises}
+    elasticity = cable_elasticity(rig, model, mass)
+    tried = [Amount(problem, evaluation, elasticity, "cable.axial_stiffness")]
     for axis, a in enumerate(AXES):
         ceiling = ceiling_candidate(rig, model, mass, axis)
-        out.append(told.get(ceiling.label, Promise(ceiling, 0.0, {f"ceiling.compliance.{a}": sink})))
+        tried.append(Amount(problem, evaluation, ceiling, f"ceiling.compliance.{a}"))
+    stretches = [usual_stiffness(rig, mass) * factor for factor in STRETCHES]
+    sinks = [largest_compliance(rig, mass) * factor for factor in SINKS]
+    out = [amount.best(sinks if k else stretches) for k, amount in enumerate(tried)]
+    first = int(np.argmax([promise.gain for promise in out]))
+    if out[first].gain > 0.0:
+        out[first] = tried[first].refined(out[first])
+    return out
+
+
+def far_promises(
+    problem: Problem, evaluation: Evaluation, promises: list[Promise], mass: float
+) -> list[Promise]:
+    """What gives way, and the best rider to one side and to all, whatever screening promises of them."""
+    if gives_way(problem.bench.parameters.model):
+        return []
+    out = [p for p in supports(problem, evaluation, mass) if p.share > WORTH]
     riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
     out += riders[:1]
+    out += [p for p in promises if p.candidate.effect == "loose_mass"][:1]
     if riders and riders[0].candidate.effect == "sprung_mass":
         # What swings along one axis may swing to all sides
         first = riders[0]

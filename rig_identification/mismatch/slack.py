@@ -7,12 +7,21 @@ between are motion of the taut rig, each with a start of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.result import Finding
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import Ideal, Start, fit_from, judged, near_noise, with_pieces
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.verdict import loudest
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
+from rig_identification.result import Finding, Mismatch
+
+Notify = Callable[[str, float], None]
 
 #: A cell reads nothing where it reads less than so many std of its noise and tolerance of its zero.
 NOTHING = 4.0
@@ -23,6 +32,13 @@ USUAL = 0.1
 FEW = 5
 #: Spells (s) closer to each other than this are one.
 JOINED = 0.2
+#: Share of the slackest cable's time below which another one rings rather than hangs loose.
+RINGING = 0.2
+#: Second differences of a tension beyond so many of their std are a shock: a cable that came taut again
+#: between two samples shows in no other way, and no motion of the body on its cables is as sudden.
+SHOCK = 8.0
+#: Mean square of whitened residuals between the spells up to which what is left there is a trace.
+SETTLED = 1.3
 #: What is cut off on either side of a spell, and the shortest stretch worth keeping, s.
 MARGIN = 0.25
 SHORTEST = 1.0
@@ -51,10 +67,29 @@ def slack_spells(run: Run, zero: float) -> list[Spell]:
         loose = np.flatnonzero(tension < limit)
         if loose.size < FEW:
             continue
-        time = c.time[loose]
-        for part in np.split(time, np.flatnonzero(np.diff(time) > JOINED) + 1):
-            start, end = run.offset + float(part[0]), run.offset + float(part[-1])
-            out.append(Spell(c.device, run.recording.name, start, end))
+        out += _spells_at(run, c.device, c.time[loose])
+    return out
+
+
+def _spells_at(run: Run, cable: str, time: NDArray[np.float64]) -> list[Spell]:
+    """Spells that hold the instants ``time`` (k,) of a run, s; none where there are no instants."""
+    parts = np.split(time, np.flatnonzero(np.diff(time) > JOINED) + 1)
+    return [
+        Spell(cable, run.recording.name, run.offset + float(part[0]), run.offset + float(part[-1]))
+        for part in parts
+        if part.size
+    ]
+
+
+def shocks(run: Run) -> list[Spell]:
+    """Moments in which a tension of ``run`` jumps or rings as no swinging body makes it."""
+    out: list[Spell] = []
+    for c in run.channels:
+        if c.quantity != "tension" or c.time.size < FEW:
+            continue
+        bend = np.diff(c.values[:, 0], 2)
+        usual = max(np.sqrt(6.0) * float(c.noise[0]), 1.4826 * float(np.median(np.abs(bend))))
+        out += _spells_at(run, c.device, c.time[1:-1][np.abs(bend) > SHOCK * usual])
     return out
 
 
@@ -75,13 +110,74 @@ def taut_stretches(run: Run, spells: list[Spell]) -> list[Run]:
     ]
 
 
+def _merged(spells: list[Spell]) -> list[tuple[str, float, float]]:
+    """(recording, start, end) in which any cable carries nothing, in order."""
+    out: list[tuple[str, float, float]] = []
+    for s in sorted(spells, key=lambda s: (s.recording, s.start)):
+        if out and out[-1][0] == s.recording and s.start <= out[-1][2] + JOINED:
+            out[-1] = (s.recording, out[-1][1], max(out[-1][2], s.end))
+        else:
+            out.append((s.recording, s.start, s.end))
+    return out
+
+
 def slack_finding(spells: list[Spell]) -> Finding:
     """The spells as one finding of the recording contract, without evidence."""
     cables = {s.cable: sum(t.end - t.start for t in spells if t.cable == s.cable) for s in spells}
     worst = max(cables, key=lambda name: cables[name])
-    times = [{"recording": s.recording, "start": round(s.start, 3), "end": round(s.end, 3)} for s in spells]
+    # A snap makes the other cables ring through nothing for a moment: that is no slack of their own
+    own = [s for s in spells if cables[s.cable] >= RINGING * cables[worst] and s.end > s.start] or spells
+    times = [
+        {"recording": recording, "start": round(start, 3), "end": round(end, 3)}
+        for recording, start, end in _merged(own)
+    ]
+    names = " and ".join(sorted({s.cable for s in own}))
     text = (
-        f"{' and '.join(sorted(cables))} went slack {len(spells)} times; these moments are left out of the "
-        "fit. Shake more gently or hang the rig so that every cable carries more."
+        f"{names} went slack {len(times)} times; these moments are left out "
+        "of the fit. Shake more gently or hang the rig so that every cable carries more."
     )
     return Finding("cable_slack", {"channel": worst, "axis": None, "times": times}, {}, {}, text)
+
+
+def spells_of(fitted: Fitted) -> list[Spell]:
+    """Slack spells of all runs of a session."""
+    zeros = [p.prior_std for p in fitted.problem.bench.parameters.free if p.name.endswith("load_cell_zero")]
+    runs = (*fitted.problem.runs, *fitted.holdout_runs)
+    return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
+
+
+def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | None:
+    """The ideal model fitted between the spells, from where nothing is bent; None where nothing is left."""
+    fitted = ideal.fitted
+    slack = {s.recording for s in spells}
+    every = (*fitted.problem.runs, *fitted.holdout_runs)
+    loose = [*spells, *(s for run in every if run.recording.name in slack for s in shocks(run))]
+    runs = tuple(part for run in fitted.problem.runs for part in taut_stretches(run, loose))
+    held = tuple(part for run in fitted.holdout_runs for part in taut_stretches(run, loose))
+    if not runs:
+        return None
+    problem = replace(fitted.problem, runs=runs)
+    point = fitted.guess or fitted.evaluation.point
+    starts = tuple(launch_state(problem.bench, run, point.theta, fitted.rest) for run in runs)
+    start = Start(problem, replace(point, starts=starts), fitted.rest, held, fitted.notes, fitted.held_parts)
+    again = fit_from(start, notify)
+    found = Ideal(again, *judged(again))
+    return found if near_noise(again) else with_pieces(found, notify)
+
+
+def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
+    """What was found between the spells, and the spells."""
+    before, after = ideal.scores.holdout, judged(found.fitted)[0].holdout
+    slack = replace(slack_finding(spells), evidence=evidence_of(ideal, found.fitted, after))
+    mismatch = found.mismatch
+    if mismatch.verdict == "none":
+        text = f"Where every cable pulls every residual is noise. {held_out_errors(before, after)}"
+        mismatch = Mismatch("explained", text, (), ())
+    elif mismatch.verdict == "unexplained" and only_a_trace(ideal.fitted, found.ideal.fitted, SETTLED):
+        # Blows that hard leave their trace in any rig: the intervals are widened by it
+        errors = held_out_errors(before, after)
+        text = f"Where every cable pulls a trace is left. {errors} {mismatch.explanation}"
+        fitted = found.ideal.fitted
+        mismatch = Mismatch("explained", text, (), mismatch.alternatives)
+        found = replace(found, fitted=fitted, loose=max(found.loose, loudest(fitted)))
+    return replace(found, mismatch=replace(mismatch, findings=(slack, *mismatch.findings)))

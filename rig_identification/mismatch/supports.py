@@ -26,8 +26,15 @@ Array = NDArray[np.float64]
 #: Frequency (Hz) and damping ratio of the ceiling, and of the cables' stretching, where a fit starts.
 CEILING_FREQUENCY = 10.0
 DAMPING = 0.03
+#: Frequency (Hz) at which a body bounces on cables of the usual stiffness.
+BOUNCE = 20.0
 #: Damping ratio of a probe: it starts unloaded, and what that costs is over after a twentieth of a second.
 PROBE_DAMPING = 1.0
+
+
+def gives_way(model: RigModel) -> bool:
+    """Whether something in the model swings or stretches already."""
+    return model.internal > 0 or not np.all(model.modes == layout.RIGID)
 
 
 def largest_compliance(rig: Rig, mass: float) -> float:
@@ -63,12 +70,12 @@ def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, prob
             o + layout.COMPLIANCE,
             bounded=False,
         )
-        names = (("frequency", "Hz", CEILING_FREQUENCY), ("damping_ratio", "1", DAMPING))
+        names = (("frequency", "Hz", CEILING_FREQUENCY, 0.5), ("damping_ratio", "1", DAMPING, 1.0))
         more = [
             Parameter(
-                f"ceiling.{name}.{a}", unit, start, 1.0, "physics", o + entry, bounded=False, ratio=True
+                f"ceiling.{name}.{a}", unit, start, std, "physics", o + entry, bounded=False, ratio=True
             )
-            for (name, unit, start), entry in zip(
+            for (name, unit, start, std), entry in zip(
                 names, (layout.FREQUENCY, layout.DAMPING_RATIO), strict=True
             )
         ]
@@ -104,17 +111,25 @@ def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, prob
     )
 
 
-def cable_elasticity(rig: Rig, model: RigModel, mass: float, stiffness: float) -> Candidate:
-    """Cables that stretch, all alike. stiffness: EA in N at which the fit starts."""
+def usual_stiffness(rig: Rig, mass: float) -> float:
+    """EA, N, of cables on which a body of ``mass`` kg bounces at BOUNCE."""
+    length = float(np.mean([c.length for c in rig.cables]))
+    return mass * (2.0 * np.pi * BOUNCE) ** 2 * length / len(rig.cables)
+
+
+def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:
+    """Cables that stretch, all alike."""
     n = model.cables
     length = float(np.mean([c.length for c in rig.cables]))
-    bounce = np.sqrt(n * stiffness / length / mass)
+    stiffness, bounce = usual_stiffness(rig, mass), 2.0 * np.pi * BOUNCE
     entries = [layout.cable_offset(i) for i in range(n)]
 
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
-        def shared(name: str, unit: str, nominal: float, std: float, entry: int) -> Parameter:
+        def shared(
+            name: str, unit: str, nominal: float, std: float, entry: int, bounded: bool = False
+        ) -> Parameter:
             first, *others = (o + entry for o in entries)
-            return Parameter(name, unit, nominal, std, "physics", first, False, tuple(others), ratio=True)
+            return Parameter(name, unit, nominal, std, "physics", first, bounded, tuple(others), ratio=True)
 
         elastic = replace(
             model,
@@ -122,7 +137,8 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float, stiffness: float) -
             can_slacken=np.zeros(n, dtype=np.bool_),
         )
         return elastic, (
-            shared("cable.axial_stiffness", "N", stiffness, 1.0, layout.AXIAL_STIFFNESS),
+            # Beyond a twentieth and twenty times nothing tells it from rigid, and each step takes minutes
+            shared("cable.axial_stiffness", "N", stiffness, 1.0, layout.AXIAL_STIFFNESS, bounded=True),
             shared("cable.axial_damping", "s", 2.0 * DAMPING / bounce, 1.0, layout.AXIAL_DAMPING),
         )
 

@@ -23,11 +23,13 @@ from rig_identification.estimate.segments import PIECE, in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.explained import evidence_of
+from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.hands import hand_finding
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.search import Trial, finished, log_evidence, mass_of, needed_gain, signs
-from rig_identification.result import Finding, Mismatch
+from rig_identification.result import Mismatch
 
 Notify = Callable[[str, float], None]
 
@@ -87,14 +89,7 @@ def _damped(
         tried.sort(key=lambda t: -t.evidence)
         best = tried[0]
         if not found:
-            rivals = [
-                {
-                    "effect": t.candidate.effect,
-                    "where": dict(t.candidate.where),
-                    "log_likelihood_gap": float(best.evidence - t.evidence),
-                }
-                for t in tried[1:]
-            ]
+            rivals = [rival(t, best) for t in tried[1:]]
         found.append(best)
         problem, evaluation = best.problem, best.evaluation
         left = [c for c in left if c.label != best.candidate.label]
@@ -141,27 +136,6 @@ def _whole(ideal: Fitted, found: list[Trial], weights: Problem, evaluation: Eval
     )
 
 
-def _finding(
-    trial: Trial, fitted: Fitted, stds_of: Evaluation, gain: float, errors: tuple[float | None, float | None]
-) -> Finding:
-    values = {p.name: p.value for p in parameter_estimates(fitted.problem, fitted.evaluation)}
-    stds = {p.name: p.std for p in parameter_estimates(fitted.problem, stds_of)}
-    told = trial.candidate.told(values, stds)
-    value, std, unit = next(iter(told.values()))
-    sentence = trial.candidate.sentence.format(value=f"{value:.3g} ± {std:.2g} {unit}", channel=None)
-    return Finding(
-        trial.candidate.effect,
-        dict(trial.candidate.where),
-        {name: {"value": float(v), "std": float(s), "unit": u} for name, (v, s, u) in told.items()},
-        {
-            "log_likelihood_gain": float(gain),
-            "holdout_error_before": errors[0],
-            "holdout_error_after": errors[1],
-        },
-        f"{sentence} {trial.candidate.advice}",
-    )
-
-
 def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     """Find what damps a watched body; None where nothing does."""
     ideal = found_ideal.fitted
@@ -186,9 +160,10 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     notify("search: whole runs", 0.85)
     fitted = _whole(ideal, found, careful[0], careful[1])
     after, verdict = judged(fitted)
-    errors = (found_ideal.scores.holdout, after.holdout)
-    gain = ideal.evaluation.cost - fitted.evaluation.cost
-    findings = [_finding(t, fitted, careful[1], gain, errors) for t in found]
+    values = {p.name: p.value for p in parameter_estimates(fitted.problem, fitted.evaluation)}
+    stds = {p.name: p.std for p in parameter_estimates(fitted.problem, careful[1])}
+    evidence = evidence_of(found_ideal, fitted, after.holdout)
+    findings = [finding(t, values, stds, evidence) for t in found]
     hand = hand_finding(ideal)
     if hand is not None:
         findings.append(hand)

@@ -29,7 +29,7 @@ from rig_identification.model.dynamics import (
     rotation,
     rotation_rate,
 )
-from rig_identification.model.effects.all import add_effects, effects_reach
+from rig_identification.model.effects.all import add_effects, effects_act, effects_reach
 from rig_identification.model.effects.cable_mass import weight_below_cell
 from rig_identification.model.effects.internal import ceiling_shift
 from rig_identification.model.effects.place import LINEAR_DENSITY
@@ -54,6 +54,7 @@ from rig_identification.model.layout import (
     SLACK,
     VELOCITY,
 )
+from rig_identification.model.state_columns import body_and_cable_columns
 
 EXCITER_CLOCK = -1  # direction: the exciter's stamps are late by this (s)
 WRENCH = 6
@@ -105,16 +106,19 @@ def _defect_in(physics, modes, mount, direction, reach, x, R, force, K, r, z, ch
             for j in range(6):
                 total -= K[i, j].imag * z[j]
             change[i] = total / STEP
-    elif not effects and size == 6 + n:
+    elif not effects:
+        # A cable's numbers stand in its own row and column
         cable = (direction - CABLES) // CABLE_SIZE
         row = 6 + cable
         for j in range(size):
             K[row, j] = 0.0
+            K[j, row] = 0.0
         add_cable(physics, cable, modes, x, R, K, r)
-        total = r[row].imag - K[row, row].imag * z[row]
-        for j in range(6):
+        total = r[row].imag
+        for j in range(size):
             total -= K[row, j].imag * z[j]
-            change[j] = -K[j, row].imag * z[row] / STEP
+            if j != row:
+                change[j] = -K[j, row].imag * z[row] / STEP
         change[row] = total / STEP
         effects = hinged
     else:
@@ -142,13 +146,13 @@ def _add_defect(K, r, z, change):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z, inverse, directions, out):  # type: ignore[no-untyped-def]
+def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse, directions, out):  # type: ignore[no-untyped-def]
     """out (6 + n + s, 12 + 2 s + 6 + len(directions)) = dz in state, wrench and physics, by complex step."""
     size, states = z.shape[0], x.shape[0]
     xc = x.astype(np.complex128)
     pc = physics.astype(np.complex128)
     fc = force.astype(np.complex128)
-    wc = wrench.astype(np.complex128)
+    R = np.empty((3, 3))
     Rc = np.empty((3, 3), dtype=np.complex128)
     Kc = np.empty((size, size), dtype=np.complex128)
     rc = np.empty(size, dtype=np.complex128)
@@ -156,16 +160,26 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, wrench, z,
     first = states + WRENCH
     block = CABLES + CABLE_SIZE * modes.shape[0]
     weighty = physics.shape[0] > block and physics[block + LINEAR_DENSITY] != 0.0
-    reach = effects_reach(physics, modes, (states - BODY_STATE) // 2)
+    internal = (states - BODY_STATE) // 2
+    reach = effects_reach(physics, modes, internal)
+    acting = internal > 0 or effects_act(physics, modes)
+    state_change = np.empty((size, states))
+    rotation(reference, x, R)
+    body_and_cable_columns(physics, modes, x, R, z, state_change)
     for column in range(states + directions.shape[0]):
         target = column if column < states else column + WRENCH
         weighs = weighty
         if column < states:
-            xc[column] = complex(x[column], STEP)
-            rotation(reference, xc, Rc)
-            assemble(pc, modes, mount, xc, Rc, fc, wc, Kc, rc)
             change[:] = 0.0
-            _add_defect(Kc, rc, z, change)
+            if acting:
+                xc[column] = complex(x[column], STEP)
+                rotation(reference, xc, Rc)
+                Kc[:, :] = 0.0
+                rc[:] = 0.0
+                add_effects(pc, modes, xc, Rc, Kc, rc)
+                _add_defect(Kc, rc, z, change)
+            for i in range(size):
+                change[i] += state_change[i, column]
         else:
             if column == states:
                 rotation(reference, xc, Rc)
@@ -370,6 +384,7 @@ def propagate(  # type: ignore[no-untyped-def]
     reference,
     forces,
     force_rates,
+    force_middles,
     wrenches,
     step,
     substeps,
@@ -388,7 +403,8 @@ def propagate(  # type: ignore[no-untyped-def]
     """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
 
     x (12 + 2 s,) and reference (3, 3): start, destroyed; s: internal coordinates.
-    forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between.
+    forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between;
+    force_middles (N, 3): what the force has midway to the next node beyond that line (a parabola).
     wrenches (N, 6): further wrench,
     body axes, held over the interval. directions (d,): entries of ``physics`` to
     differentiate in (EXCITER_CLOCK: clock). start_columns (X, b + d): derivative of the
@@ -439,6 +455,7 @@ def propagate(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     after = forces[node, i] if last else forces[node + 1, i]
                     force[i] = forces[node, i] + at * (after - forces[node, i])
+                    force[i] += 4.0 * at * (1.0 - at) * force_middles[node, i]
                     rate_after = force_rates[node, i] if last else force_rates[node + 1, i]
                     rate[i] = force_rates[node, i] + at * (rate_after - force_rates[node, i])
                 rotation(reference, y, R)
@@ -451,9 +468,7 @@ def propagate(  # type: ignore[no-untyped-def]
                     if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
                         return node
                 if sensitivity:
-                    linearise(
-                        physics, modes, mount, reference, y, force, rate, wrench, z, inverse, directions, dz
-                    )
+                    linearise(physics, modes, mount, reference, y, force, rate, z, inverse, directions, dz)
                 if s == 0 and sub == 0:
                     nodes_x[node] = y
                     nodes_R[node] = R

@@ -161,9 +161,10 @@ class Input:
     """What drives the body, at equidistant nodes."""
 
     step: float  # s between nodes
-    force: Array  # (N, 3) exciter force, exciter frame, N, linear between nodes
+    force: Array  # (N, 3) exciter force, exciter frame, N; linear between nodes but for ``middle``
     force_rate: Array  # (N, 3) N/s, linear between nodes
     wrench: Array  # (N, 6) further force and moment about the datum, body axes, held over each interval
+    middle: Array | None = None  # (N, 3) force midway to the next node beyond the line; none: linear
 
     @staticmethod
     def none(nodes: int, step: float) -> Input:
@@ -277,6 +278,7 @@ def simulate(
         R,
         np.ascontiguousarray(drive.force),
         np.ascontiguousarray(drive.force_rate),
+        np.zeros_like(drive.force) if drive.middle is None else np.ascontiguousarray(drive.middle),
         np.ascontiguousarray(drive.wrench),
         drive.step,
         substeps or substeps_for(model, drive.step, FIT_STEP if sensitivity else FINE_STEP),

@@ -1,18 +1,28 @@
-"""A service whose answer comes later, without a thread and without holding the executor.
+"""A service whose answer comes later, and is not lost, without a thread and without holding the executor.
 
 The events executor calls a service's callback and hands what it returns to ``send_response``; it does not
 know coroutines. A callback here may return :class:`Later`: the request's header is kept, and the answer is
 sent when there is one.
+
+A client that the graph has only just met can ask before this side knows where its answers go (DDS-RPC 1.0,
+section 7.6.2: the endpoints of one client are discovered one by one). The middleware then waits 100 ms, drops
+the answer and warns, and the client waits for ever. Here such an answer is sent again until it arrives or
+:data:`GIVEN_UP` has passed. A client that is gone is no such case: the middleware knows it and says nothing.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_srvs.srv import Trigger
+
+#: s between two attempts to send an answer, and after which it is given up.
+AGAIN, GIVEN_UP = 0.25, 10.0
 
 
 class Later:
@@ -45,18 +55,41 @@ def serve_later(
     group: CallbackGroup | None = None,
 ) -> None:
     """Offer a Trigger service; ``begin`` answers at once or returns a :class:`Later`."""
+    clock = Clock(clock_type=ClockType.STEADY_TIME)
 
     def call(request: Trigger.Request, response: Trigger.Response) -> Any:
         _ = request, response
         return begin()
 
+    def after(seconds: float, work: Callable[[], None]) -> None:
+        def once() -> None:
+            node.destroy_timer(timer)
+            work()
+
+        timer = node.create_timer(seconds, once, clock=clock)
+
     service = node.create_service(Trigger, name, call, callback_group=group)
     send_now = service.send_response
 
     def send_response(answer: Later | Trigger.Response, header: object) -> None:
+        def send(response: Trigger.Response) -> None:
+            send_until_heard(lambda: send_now(response, header), after)
+
         if isinstance(answer, Later):
-            answer.bind(lambda response: send_now(response, header))
+            answer.bind(send)
         else:
-            send_now(answer, header)
+            send(answer)
 
     service.send_response = send_response  # type: ignore[method-assign, assignment]
+
+
+def send_until_heard(
+    send: Callable[[], None], after: Callable[[float, Callable[[], None]], None], spent: float = 0.0
+) -> None:
+    """Call ``send``; as long as it warns that nobody was there, ``after`` a while again."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        send()
+    lost = any("failed to send response" in str(warning.message) for warning in told)
+    if lost and spent < GIVEN_UP:
+        after(AGAIN, lambda: send_until_heard(send, after, spent + AGAIN))

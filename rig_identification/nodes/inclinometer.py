@@ -25,7 +25,12 @@ def device(rig: Rig) -> Device:
         return sensors.inclinometer(rows, orientation, np.concatenate([error.rotation, np.zeros(2)])).values
 
     return Device(
-        "inclinometer", 2, (("inclinometer/angles", slice(0, 2)),), noise_names(("inclination", 2)), read
+        "inclinometer",
+        2,
+        (("inclinometer/angles", slice(0, 2)),),
+        noise_names(("inclination", 2)),
+        read,
+        placed=False,
     )
 
 

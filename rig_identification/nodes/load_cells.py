@@ -24,7 +24,13 @@ def device(rig: Rig) -> Device:
 
     noise = noise_names(("tension", n), ("exciter_force", exciter))
     return Device(
-        "load_cells", n + exciter, tuple(zip(topics, slices, strict=True)), noise, read, mounted=False
+        "load_cells",
+        n + exciter,
+        tuple(zip(topics, slices, strict=True)),
+        noise,
+        read,
+        placed=False,
+        turned=False,
     )
 
 

@@ -1,4 +1,4 @@
-"""``preprocessor``: the generalized wrench about the centre of mass, in body axes."""
+"""``preprocessor``: generalized wrench about the centre of mass, body axes, and how well it is known."""
 
 from __future__ import annotations
 
@@ -6,24 +6,28 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from std_msgs.msg import Header
+from std_msgs.msg import Float64MultiArray, Header
 
-from rig_identification.estimate.first_guess import first_elements
 from rig_identification.live.common_time import CommonTime
 from rig_identification.live.generalized_wrench import generalized_wrench
+from rig_identification.live.known_body import KnownBody
 from rig_identification.live.stamp_gate import StampGate
+from rig_identification.live.wrench_uncertainty import wrench_uncertainty
 from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.odometry_wire import read_odometry
 from rig_identification.nodes.parameters import OwnParameter, within
 from rig_identification.nodes.rig_node import LATCHED, OK, WARN, RigNode, diagnostic, reliable
-from rig_identification.nodes.wire import StampedDoubles
-from rig_identification.recording import Session
+from rig_identification.nodes.wire import Array, StampedDoubles, Stamps
 from rig_identification.session.topics import expected_topics
 
 PARAMETERS = (
     OwnParameter(
         "center_of_mass", [0.0], "m, body frame; one number: the identifier's latest, before it a guess"
     ),
+    OwnParameter(
+        "center_of_mass_std", [0.0], "m, of a center_of_mass that is given", within(0.0, 100.0, "m")
+    ),
+    OwnParameter("std_rate", 10.0, "Hz of generalized_wrench_std; 0: none", within(0.0, 100.0, "Hz")),
     OwnParameter("include_weight", True, "gravity is part of the force"),
     OwnParameter("period", 0.01, "s between looks at what arrived", within(0.001, 0.5, "s")),
     OwnParameter("depth", 2000, "messages kept of each topic: seconds of the fastest", within(10, 100_000)),
@@ -37,11 +41,9 @@ class PreprocessorNode(RigNode):
     def __init__(self) -> None:
         super().__init__("preprocessor", PARAMETERS)
         self._description = rig = self.rig()
-        elements = first_elements(Session("live", rig, ()))
-        self.mass, self.center = float(elements[0]), elements[1:4]
-        self.center_from = "a guess by the rig's size"
-        if self.own.vector("center_of_mass").size == 3:
-            self.center, self.center_from = self.own.vector("center_of_mass", 3), "parameter"
+        given = self.own.vector("center_of_mass")
+        center = given if given.size == 3 else None
+        self.body = KnownBody(rig, center, self.own.vector("center_of_mass_std", 3))
         names = tuple(cable.name for cable in rig.cables)
         used = ("tension", "exciter_force") if rig.exciter is not None else ("tension",)
         topics = expected_topics(names, self.get_namespace())
@@ -55,18 +57,22 @@ class PreprocessorNode(RigNode):
         self.create_subscription(
             InertiaStamped, "identifier/inertia", self.guarded(self._hear_inertia), LATCHED
         )
+        self.create_subscription(
+            Float64MultiArray, "identifier/covariance", self.guarded(self._hear_covariance), LATCHED
+        )
         self._writer = StampedDoubles(WrenchStamped(header=Header(frame_id="center_of_mass")), 6)
         self._wrench = self.create_publisher(WrenchStamped, "generalized_wrench", reliable(depth))
+        self._std = self.create_publisher(WrenchStamped, "generalized_wrench_std", reliable(100))
+        self._std_ns = 0  # instant of the last one
         self.published = 0
         self.every(self.own.number("period"), self._work)
 
     def _hear_inertia(self, message: InertiaStamped) -> None:
         com = message.inertia.com
-        center = np.array([com.x, com.y, com.z])
-        if self.center_from != "parameter" and np.all(np.isfinite(center)):
-            self.center, self.center_from = center, "identifier"
-            if np.isfinite(message.inertia.m):
-                self.mass = message.inertia.m
+        self.body.identified(message.inertia.m, np.array([com.x, com.y, com.z]))
+
+    def _hear_covariance(self, message: Float64MultiArray) -> None:
+        self.body.doubted(np.reshape(message.data, (10, 10)))
 
     def _work(self) -> None:
         for batch in self.intake.take():
@@ -85,19 +91,38 @@ class PreprocessorNode(RigNode):
             return
         tension = np.concatenate([values_at[cable.name] for cable in self._description.cables], axis=1)
         force = values_at.get(_EXCITER, np.zeros((len(stamps), 3)))
-        weight = self.mass * self._description.gravity if self.own.flag("include_weight") else 0.0
-        wrench = generalized_wrench(self._description, values_at[_POSE], tension, force, self.center, weight)
+        center, weight = self.body.center, self._weight(self.body.mass)
+        wrench = generalized_wrench(self._description, values_at[_POSE], tension, force, center, weight)
         for message in self._writer.serialize(stamps, wrench):
             self._wrench.publish(message)
         self.published += len(stamps)
+        rate = self.own.number("std_rate")
+        if rate > 0.0 and abs(int(stamps[-1]) - self._std_ns) >= 1e9 / rate:
+            self._std_ns = int(stamps[-1])
+            self._publish_std(stamps[-1:], values_at[_POSE][-1], tension[-1], force[-1])
+
+    def _weight(self, mass: float) -> float:
+        """N, as far as it is part of the force."""
+        return mass * self._description.gravity if self.own.flag("include_weight") else 0.0
+
+    def _publish_std(self, stamp: Stamps, pose: Array, tension: Array, force: Array) -> None:
+        """Standard deviations of one instant's wrench: they change slowly, and cost more than it does."""
+        body = self.body
+        found = wrench_uncertainty(
+            self._description, pose, tension, force, body.center, body.center_std,
+            self._weight(body.mass), self._weight(body.mass_std),
+        )  # fmt: skip
+        (message,) = self._writer.serialize(stamp, found.std[None])
+        self._std.publish(message)
 
     def status(self) -> list[DiagnosticStatus]:
         """Where the centre of mass is from, and instants without a full set of values."""
         lost = self._common.given_up
         line = diagnostic(
             f"{self.get_name()}: wrench", WARN if lost else OK,
-            f"{lost} instants lack a device's value" if lost else f"centre of mass: {self.center_from}",
-            published=self.published, center_of_mass=np.round(self.center, 4).tolist(), mass=self.mass,
+            f"{lost} instants lack a device's value" if lost else f"centre of mass: {self.body.center_from}",
+            published=self.published, center_of_mass=np.round(self.body.center, 4).tolist(),
+            mass=self.body.mass,
         )  # fmt: skip
         return [*super().status(), line]
 

@@ -13,6 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from rig_identification.errors import RigIdentificationError
+from rig_identification.nodes.deferred import serve_later
 from rig_identification.nodes.parameters import OwnParameter, OwnParameters
 from rig_identification.nodes.rig_parameters import refuse_misspelt, rig_of
 from rig_identification.rig import Rig
@@ -79,12 +80,11 @@ class RigNode(Node):
     def serve(self, name: str, answer: Callable[[], str], group: CallbackGroup | None = None) -> None:
         """Offer a Trigger service; ``answer`` returns the message, or raises what the caller is told."""
 
-        def call(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            _ = request
-            response.success, response.message = self.outcome(answer)
-            return response
+        def call() -> Trigger.Response:
+            success, message = self.outcome(answer)
+            return Trigger.Response(success=success, message=message)
 
-        self.create_service(Trigger, name, call, callback_group=group)
+        serve_later(self, name, call, group)
 
     def outcome(self, answer: Callable[[], str]) -> tuple[bool, str]:
         """(success, message) of a request."""

@@ -11,10 +11,12 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Float64MultiArray
 
 from rig_identification.errors import InputError
+from rig_identification.live.machine_code import compile_plant
 from rig_identification.live.plant import Plant, Shaking, odometry_values
-from rig_identification.live.plant_effects import PlantEffects, with_effects
+from rig_identification.live.plant_effects import with_effects
+from rig_identification.live.plant_switches import SWITCHES, effects_of
 from rig_identification.model.body import can_exist
-from rig_identification.model.motion import Motion, RigModel, rig_model
+from rig_identification.model.motion import Motion, rig_model
 from rig_identification.nodes.parameters import OwnParameter, within
 from rig_identification.nodes.plant_message import TOPIC, to_message
 from rig_identification.nodes.rig_node import OK, WARN, RigNode, diagnostic, reliable
@@ -23,25 +25,14 @@ from rig_identification.session.messages import serialize
 from rig_identification.session.topics import expected_topics
 
 #: Effects that the plant can have; those of the devices are the sensor nodes' own parameters.
-EFFECTS = (
+EFFECTS = tuple(
     OwnParameter(
-        "effect.cable_elasticity", 0.0, "EA of the cables, N; 0: inextensible", within(0.0, 1e12, "N")
-    ),
-    OwnParameter("effect.cable_length", [0.0], "m that cables are longer than described, each or all"),
-    OwnParameter("effect.cable_mass", 0.0, "kg/m of the cables", within(0.0, 1e3, "kg/m")),
-    OwnParameter("effect.hinge_damping", 0.0, "N m s/rad of each hinge", within(0.0, 1e6)),
-    OwnParameter("effect.hinge_friction", 0.0, "N m of each hinge", within(0.0, 1e6)),
-    OwnParameter("effect.air_drag", 0.0, "Cd A, m^2", within(0.0, 1e4, "m^2")),
-    OwnParameter("effect.air_added_mass", 0.0, "kg of entrained air", within(0.0, 1e4, "kg")),
-    OwnParameter("effect.exciter_rotor", 0.0, "kg that the exciter moves", within(0.0, 1e4, "kg")),
-    OwnParameter(
-        "effect.exciter_gain", 0.0, "0.01: the true force is 1 % above the measured", within(-0.5, 0.5)
-    ),
-    OwnParameter(
-        "effect.level_error", [0.0, 0.0], "rad, ceiling tilted about world x and y", within(-0.5, 0.5)
-    ),
-    OwnParameter("effect.tether", [0.0, 0.0, 0.0], "N/m along world axes, slack at rest", within(0.0, 1e9)),
-    OwnParameter("effect.tether_point", [0.0, 0.0, 0.0], "m, body frame", within(-100.0, 100.0, "m")),
+        f"effect.{switch.name}",
+        list(switch.default) if isinstance(switch.default, tuple) else switch.default,
+        switch.meaning,
+        within(switch.low, switch.high, switch.unit),
+    )
+    for switch in SWITCHES
 )
 PARAMETERS = (
     OwnParameter("speed", 1.0, "simulated seconds a second", within(0.01, 100.0)),
@@ -69,15 +60,6 @@ PARAMETERS = (
     ),
     *EFFECTS,
 )
-_NUMBERS = (
-    "cable_mass",
-    "hinge_damping",
-    "hinge_friction",
-    "air_drag",
-    "air_added_mass",
-    "exciter_rotor",
-    "exciter_gain",
-)
 #: Wall seconds between two blocks.
 TICK = 0.01
 #: Simulated seconds that one tick makes up for at most.
@@ -94,7 +76,7 @@ class RigSimulator(RigNode):
             raise InputError(
                 "parameter publish_clock: a speed other than 1 needs the simulated clock; set it true"
             )
-        self.plant = Plant(self._model(), time.time_ns())
+        self.plant = self._make_plant()
         self._blocks = self.create_publisher(Float64MultiArray, TOPIC, reliable(200))
         self._truth = self.create_publisher(Odometry, "ground_truth/odometry", reliable(1000))
         names = tuple(cable.name for cable in rig.cables)
@@ -112,7 +94,7 @@ class RigSimulator(RigNode):
         self.serve("~/stop_shaking", self._stop_shaking)
         self.serve("~/come_to_rest", self._come_to_rest)
 
-    def _model(self) -> RigModel:
+    def _make_plant(self) -> Plant:
         rig = self.rig()
         inertia = self.own.vector("body.inertia", 6)
         elements = np.concatenate(
@@ -122,16 +104,10 @@ class RigSimulator(RigNode):
             raise InputError(
                 f"parameter body.inertia: no body has {inertia.tolist()} kg m^2; order is xx xy xz yy yz zz"
             )
-        stiffness = self.own.number("effect.cable_elasticity")
-        model = rig_model(rig, elements, axial_stiffness=stiffness or None)
-        effects = PlantEffects(
-            **{name: self.own.number(f"effect.{name}") for name in _NUMBERS},
-            tether=self.own.vector("effect.tether", 3),
-            tether_point=self.own.vector("effect.tether_point", 3),
-            cable_length=self.own.vector("effect.cable_length", len(rig.cables)),
-            level_error=self.own.vector("effect.level_error", 2),
-        )
-        return with_effects(model, effects)
+        model = rig_model(rig, elements)
+        switched = {switch.name: self.own.vector(f"effect.{switch.name}") for switch in SWITCHES}
+        effects = effects_of(switched, model, "parameter effect.")
+        return Plant(with_effects(model, effects), time.time_ns(), push=effects.push)
 
     def _shaking(self) -> Shaking:
         return Shaking(self.own.vector("shake.amplitude", 3), self.own.vector("shake.frequency", 3))
@@ -183,6 +159,10 @@ class RigSimulator(RigNode):
             f"{self.get_name()}: pace", WARN if slow else OK, message, simulated=0.001 * self.plant.nodes
         )
         return [*super().status(), line]
+
+
+#: Compiled before the node is made.
+prepare = compile_plant
 
 
 def create() -> RigSimulator:

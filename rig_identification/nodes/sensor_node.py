@@ -34,12 +34,20 @@ PARAMETERS = (
         "simulation.noise", [-1.0], "standard deviation of one sample, SI; -1: rig description's noise"
     ),
     OwnParameter("simulation.bias", [0.0], "constant error of each channel, SI; one number stands for all"),
-    OwnParameter("simulation.gain", [0.0], "error of each channel's scale: 0.01 reads 1 % high"),
     OwnParameter(
-        "simulation.position_error", [0.0, 0.0, 0.0], "m that the device sits off its description, body axes"
+        "simulation.gain", [0.0], "error of each channel's scale: 0.01 reads 1 % high", within(-0.9, 9.0)
     ),
     OwnParameter(
-        "simulation.rotation_error", [0.0, 0.0, 0.0], "rad, rotation vector of its frame, body axes"
+        "simulation.position_error",
+        [0.0, 0.0, 0.0],
+        "m that the device sits off its description, body axes",
+        within(-10.0, 10.0, "m"),
+    ),
+    OwnParameter(
+        "simulation.rotation_error",
+        [0.0, 0.0, 0.0],
+        "rad, rotation vector of its frame, body axes",
+        within(-3.2, 3.2, "rad"),
     ),
     OwnParameter(
         "simulation.time_constant", 0.0, "s of a first-order low-pass in the device", within(0.0, 10.0, "s")
@@ -81,7 +89,8 @@ class Device:
     topics: tuple[tuple[str, slice], ...]  # contract name of each topic, its columns of the sample
     noise: tuple[str, ...]  # (width) key of Rig.noise for each column
     read: Callable[[Array, MountError], Array]  # rows of the plant to true samples
-    mounted: bool = True  # it has a place and a direction on the body, which may be wrong
+    placed: bool = True  # what it reads depends on where on the body it sits
+    turned: bool = True  # what it reads depends on how it is turned against the body
 
 
 class SensorNode(RigNode):
@@ -132,10 +141,15 @@ class SensorNode(RigNode):
         mount = MountError(
             self.own.vector("simulation.position_error", 3), self.own.vector("simulation.rotation_error", 3)
         )
-        if not self.device.mounted and (np.any(mount.position) or np.any(mount.rotation)):
-            raise InputError(
-                f"parameter simulation.position_error: {self.device.node} has no mount on the body"
-            )
+        for name, matters, error in (
+            ("position", self.device.placed, mount.position),
+            ("rotation", self.device.turned, mount.rotation),
+        ):
+            if np.any(error) and not matters:
+                raise InputError(
+                    f"parameter simulation.{name}_error: {self.device.node} reads the same at any {name}; "
+                    "leave it out"
+                )
         read = self.device.read
         source = SimulatedSource(
             self.own.number("simulation.rate"), lambda rows: read(rows, mount), errors, rng

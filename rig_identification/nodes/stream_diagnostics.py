@@ -18,17 +18,21 @@ CLOCKS_APART = 0.1
 def stream_status(node: Node, intake: Intake) -> list[DiagnosticStatus]:
     """One line a topic; called each second."""
     intake.look_for_clipping()
-    offsets = [gate.offset for gate in intake.gates.values() if np.isfinite(gate.offset)]
-    reference = float(np.median(offsets)) if offsets else 0.0
-    return [_topic_status(node, intake, name, reference) for name in intake.topics]
+    return [_topic_status(node, intake, name) for name in intake.topics]
 
 
-def _topic_status(node: Node, intake: Intake, name: str, reference: float) -> DiagnosticStatus:
+def _reference(intake: Intake, name: str) -> float:
+    """Median offset (s) of the other topics' clocks; this one's own where there are none."""
+    offsets = [g.offset for other, g in intake.gates.items() if other != name and np.isfinite(g.offset)]
+    return float(np.median(offsets)) if offsets else intake.gates[name].offset
+
+
+def _topic_status(node: Node, intake: Intake, name: str) -> DiagnosticStatus:
     gate = intake.gates[name]
     if gate.received == 0:
         return diagnostic(f"{node.get_name()}: {name}", OK, "not there")
     level, message = OK, f"{gate.rate:.4g} Hz"
-    late = reference - gate.offset  # positive: its stamps are late
+    late = _reference(intake, name) - gate.offset  # positive: its stamps are late
     publishers = node.count_publishers(name)
     if gate.rejected or intake.not_finite[name] or intake.garbled[name]:
         level, message = WARN, f"{gate.rejected} stamps refused, {intake.not_finite[name]} samples not finite"

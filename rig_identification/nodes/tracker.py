@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from visualization_msgs.msg import MarkerArray
 
 from rig_identification.live.body_tracker import BodyTracker, Tracked
+from rig_identification.live.machine_code import compile_tracker
 from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.markers import rig_markers
 from rig_identification.nodes.odometry_wire import OdometryWriter
@@ -27,6 +28,8 @@ PARAMETERS = (
 #: Forces change the track slowly: they are looked at once in so many times.
 FORCES_EVERY = 5
 _PROMPT = ("imu", "inclination")
+#: s from a sample's arrival after which its odometry is late; the latest 1 % may be.
+LATE = 0.02
 _USED = ("tension", "exciter_force", "imu", "inclination")
 
 
@@ -51,6 +54,7 @@ class TrackerNode(RigNode):
         self._latest: Tracked | None = None
         self._silent_tension: list[str] = []
         self.latency: deque[float] = deque(maxlen=20_000)  # s, from an IMU sample's arrival to its odometry
+        self.tracked = self.late = 0  # samples since the start; those whose odometry came later than LATE
         self.every(self.own.number("period"), self._work)
         if self.own.number("marker_rate") > 0.0:
             self.every(1.0 / self.own.number("marker_rate"), self._draw)
@@ -79,7 +83,10 @@ class TrackerNode(RigNode):
         for message in self._writer.serialize(tracked):
             self._odometry.publish(message)
         self._latest = tracked
-        self.latency.extend(((self.intake.now_ns() - imu.arrival_ns) / 1e9).tolist())
+        latency = (self.intake.now_ns() - imu.arrival_ns) / 1e9
+        self.latency.extend(latency.tolist())
+        self.tracked += latency.size
+        self.late += int(np.count_nonzero(latency > LATE))
 
     def _draw(self) -> None:
         if self._latest is None:
@@ -100,12 +107,16 @@ class TrackerNode(RigNode):
                 name, OK, f"position to {1e3 * std:.1f} mm",
                 latency_p50_ms=f"{1e3 * np.percentile(latency, 50):.2f}",
                 latency_p99_ms=f"{1e3 * np.percentile(latency, 99):.2f}",
-                restarts=self.tracker.restarts,
+                tracked=self.tracked, late=self.late, restarts=self.tracker.restarts,
             )  # fmt: skip
         return [*super().status(), line]
 
     def _imu_topic(self) -> str:
         return next(name for name, topic in self.intake.topics.items() if topic.channel == "imu")
+
+
+#: Compiled before the node is made.
+prepare = compile_tracker
 
 
 def create() -> TrackerNode:

@@ -42,18 +42,22 @@ class Flight:
         return simulate(true.model, self.motion.state(node), short).state(1)
 
 
-def fly(true: TrueRig, start: State, force: ForceProgram | None, duration: float, name: str) -> Flight:
-    """Motion from ``start`` over ``duration`` s.
+def fly(
+    true: TrueRig, start: State, force: ForceProgram | None, duration: float, name: str, begin: float = 0.0
+) -> Flight:
+    """Motion from ``start`` over ``duration`` s. begin: s from which a push's times count.
 
     Raises InputError where the motion leaves every bound.
     """
     nodes = int(np.ceil(duration / STEP)) + 1
     time = np.arange(nodes, dtype=float) * STEP
     turns = np.broadcast_to(start.R_world_body, (nodes, 3, 3))
-    applied = np.zeros((nodes, 3))
+    applied, wrench = np.zeros((nodes, 3)), np.zeros((nodes, 6))
+    if true.effects.push is not None:
+        wrench = true.effects.push.wrench(time - begin + 0.5 * STEP)  # held: its value in the middle
     for _ in range(PASSES):
         before, applied = applied, in_exciter_frame(true, force, time, turns)
-        motion = simulate(true.model, start, driven(applied))
+        motion = simulate(true.model, start, driven(applied, wrench))
         if not motion.complete:
             reached = STEP * motion.nodes
             raise InputError(
@@ -62,12 +66,12 @@ def fly(true: TrueRig, start: State, force: ForceProgram | None, duration: float
         turns = motion.R_world_body
         if force is None or force.axes != "world" or np.max(np.abs(applied - before)) < AGREED:
             break
-    return Flight(Grid(STEP, nodes), driven(applied), motion)
+    return Flight(Grid(STEP, nodes), driven(applied, wrench), motion)
 
 
-def driven(applied: Array) -> Input:
-    """Input of a measured force (N, 3) at the nodes."""
-    return Input(STEP, applied, np.gradient(applied, STEP, axis=0), np.zeros((applied.shape[0], 6)))
+def driven(applied: Array, wrench: Array) -> Input:
+    """Input of a measured force (N, 3) and of an unmeasured wrench (N, 6) at the nodes."""
+    return Input(STEP, applied, np.asarray(np.gradient(applied, STEP, axis=0)), wrench)
 
 
 def in_exciter_frame(true: TrueRig, force: ForceProgram | None, time: Array, R_world_body: Array) -> Array:

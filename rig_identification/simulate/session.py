@@ -37,6 +37,7 @@ class Truth:
     described: dict[str, float]  # ... -> what the description says
     starts: dict[str, State]  # run -> state at the recording's time 0 (load cells' clock)
     least_tension: dict[str, float]  # run -> N, over all cables; 0: a cable went slack
+    effects: dict[str, tuple[float, ...]]  # what was switched on: see SessionSpec
 
 
 def simulate_session(spec: SessionSpec, rng: np.random.Generator) -> tuple[Session, Truth]:
@@ -55,14 +56,15 @@ def simulate_session(spec: SessionSpec, rng: np.random.Generator) -> tuple[Sessi
         if not run.duration > 0.0:
             raise InputError(f"{run.name}: duration {run.duration:g} s must be positive")
         start = start_state(true.model, run.start, rest)
-        flight = fly(true, start, run.force, run.duration + 2.0 * LEAD, run.name)
+        flight = fly(true, start, run.force, run.duration + 2.0 * LEAD, run.name, LEAD)
         recording, begin = _record_run(spec, true, run, flight, _start_ns(spec, len(recordings)), rng)
         recordings.append(recording)
         starts[run.name] = flight.state_at(true, begin)
         least[run.name] = float(np.min(flight.motion.outputs[:, layout.OUT_TENSION :]))
     session = Session(spec.name, true.described, tuple(recordings))
     described = {p.name: p.nominal for p in true.parameters.free}
-    return session, Truth(np.array(spec.elements, dtype=float), true.values, described, starts, least)
+    elements, effects = np.array(spec.elements, dtype=float), dict(spec.effects)
+    return session, Truth(elements, true.values, described, starts, least, effects)
 
 
 def _start_ns(spec: SessionSpec, number: int) -> int:

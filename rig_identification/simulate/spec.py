@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,7 +64,9 @@ class SessionSpec:
     ``noise``: every sample has the noise of ``rig.noise``. ``doubts``: the true rig is drawn
     about the description, each quantity by its tolerance (normal, cut at three tolerances:
     what lies beyond would be a finding), and the scale's reading about the true mass.
-    ``rods``: the cables push as well.
+    ``rods``: the cables push as well. ``effects``: left-out physics by the switches of
+    ``live/plant_switches.py`` (a push's start counts from the run's), and errors of devices by the names of
+    their doubts (``imu.gyroscope_bias.x``), on top of what is drawn.
     """
 
     name: str
@@ -75,5 +78,6 @@ class SessionSpec:
     noise: bool = True
     doubts: bool = True
     rods: bool = False
+    effects: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     world_in_tracker: Mount = field(default_factory=lambda: TRACKER)
     start_ns: int = 1_790_000_000_000_000_000  # stamp at which the first recording starts

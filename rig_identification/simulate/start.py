@@ -84,6 +84,9 @@ def _pulled_aside(model: RigModel, pull: Pulled, rest: State) -> State:
     ceiling = np.array([physics[o + layout.CEILING_POINT : o + layout.CEILING_POINT + 3] for o in offsets])
     hinges = np.array([physics[o + layout.BODY_POINT : o + layout.BODY_POINT + 3] for o in offsets])
     lengths = np.array([physics[o + layout.LENGTH] for o in offsets])
+    if model.internal or np.any(model.modes != layout.RIGID):
+        # What stretches or yields does so about as much aside as it does at rest
+        lengths = np.linalg.norm(ceiling - rest.position - hinges @ rest.R_world_body.T, axis=1)
     weight = mass * float(np.linalg.norm(gravity))
 
     def placed(q: Array) -> tuple[Array, Rotation]:
@@ -109,4 +112,5 @@ def _pulled_aside(model: RigModel, pull: Pulled, rest: State) -> State:
         size = float(np.linalg.norm(pull.force))
         raise InputError(f"start: no pose holds against a pull of {size:.4g} N; pull less")
     position, turn = placed(found.x)
-    return on_cables(model, State(position, turn.as_matrix(), np.zeros(3), np.zeros(3)))
+    aside = State(position, turn.as_matrix(), np.zeros(3), np.zeros(3), rest.internal)
+    return on_cables(model, aside)

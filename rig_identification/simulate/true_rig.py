@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import truncnorm
 
+from rig_identification.errors import InputError
 from rig_identification.estimate.parameters import INERTIAL, UNKNOWN_ROTATION, ParameterSet, parameter_set
+from rig_identification.live.plant_effects import PlantEffects, with_effects
+from rig_identification.live.plant_switches import SWITCHES, effects_of
 from rig_identification.model import layout
 from rig_identification.model.motion import RigModel, rig_model
 from rig_identification.rig import Rig
@@ -30,6 +33,7 @@ class TrueRig:
     parameters: ParameterSet
     values: dict[str, float]  # parameter name -> true value
     described: Rig  # description, with the scale's reading of the mass
+    effects: PlantEffects = field(default_factory=PlantEffects)  # left-out physics, in ``model`` already
 
     def late(self, device: str) -> float:
         """By how much the stamps of a device are late, s."""
@@ -56,7 +60,10 @@ def channels_of(spec: SessionSpec) -> set[str]:
 
 
 def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
-    """The true rig of a session; the description itself where ``spec.doubts`` is off."""
+    """The true rig of a session; the description itself where ``spec.doubts`` and ``spec.effects`` are off.
+
+    Raises InputError where an effect is unknown or makes no sense.
+    """
     model = rig_model(spec.rig, spec.elements, rods=spec.rods)
     parameters = parameter_set(spec.rig, model, channels_of(spec))
     theta = parameters.start(spec.elements)
@@ -71,4 +78,32 @@ def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
             described = replace(described, mass=reading)
     values = {p.name: float(v) for p, v in zip(parameters.free, parameters.values(theta), strict=True)}
     true = model.with_physics(parameters.physics(theta))
-    return TrueRig(true, parameters.device(theta), parameters, values, described)
+    out = TrueRig(true, parameters.device(theta), parameters, values, described)
+    return _with_device_errors(_with_physics(out, spec), spec) if spec.effects else out
+
+
+_SWITCHED = frozenset(switch.name for switch in SWITCHES)
+
+
+def _with_physics(true: TrueRig, spec: SessionSpec) -> TrueRig:
+    """The rig with its plant's effects."""
+    given = {name: values for name, values in spec.effects.items() if name in _SWITCHED}
+    effects = effects_of(given, true.model, "effect ")
+    return replace(true, model=with_effects(true.model, effects), effects=effects)
+
+
+def _with_device_errors(true: TrueRig, spec: SessionSpec) -> TrueRig:
+    """The rig with its devices' errors."""
+    device, values = true.device.copy(), dict(true.values)
+    errors = {p.name: p for p in true.parameters.free if p.kind == "device"}
+    for name, given in spec.effects.items():
+        if name in _SWITCHED:
+            continue
+        if name not in errors:
+            known = ", ".join(sorted([*_SWITCHED, *errors]))
+            raise InputError(f"effect {name}: is unknown; known are {known}")
+        if len(given) != 1 or not np.isfinite(given[0]):
+            raise InputError(f"effect {name}: give one finite number")
+        device[errors[name].index] += given[0]
+        values[name] += given[0]
+    return replace(true, device=device, values=values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -26,8 +27,8 @@ class EulerPredictor:
     """w_hat(n+1) = w(n) + T J^-1 (M(n) - g w(n) x J w(n)) as errors and slopes in the six parameters."""
 
     def __init__(self, rate: Array, moment: Array, sampling: float, gyroscopic: bool) -> None:
-        self.rate, self.moment = rate[:-1], moment[:-1]
-        self.change = rate[1:] - rate[:-1]
+        self.rate, self.moment = np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(moment[:-1])
+        self.change = np.ascontiguousarray(rate[1:] - rate[:-1])
         self.sampling = sampling
         self.gyroscopic = gyroscopic
 
@@ -35,29 +36,106 @@ class EulerPredictor:
         """(n - 1, 3) rad/s; None where J cannot be inverted."""
         return None if (parts := self._parts(parameters)) is None else parts[0]
 
-    def error_and_slope(self, parameters: Array) -> tuple[Array, Array] | None:
-        """Errors and their slopes (n - 1, 3, 6)."""
-        parts = self._parts(parameters)
-        if parts is None:
-            return None
-        error, inverse, acceleration = parts
-        # d(J^-1 u) = -J^-1 dJ J^-1 u + J^-1 du, with du = -w x dJ w.
-        slope = np.einsum("kij,nj->nik", ELEMENTS, acceleration)
-        if self.gyroscopic:
-            spin = np.einsum("kij,nj->nik", ELEMENTS, self.rate)
-            slope = slope + np.cross(self.rate[:, :, None], spin, axisa=1, axisb=1, axisc=1)
-        return error, self.sampling * (inverse @ slope)
+    def cost(self, parameters: Array, weight: Array) -> float:
+        """Weighted sum of squares; infinite where J cannot be inverted."""
+        found = _inverted(parameters)
+        return np.inf if found is None else float(self._sums(*found, weight, False)[0])
+
+    def normal(self, parameters: Array, weight: Array) -> tuple[float, Array, Array] | None:
+        """(weighted sum of squares, its Hessian after Gauss (6, 6), gradient (6,)), both halved."""
+        found = _inverted(parameters)
+        return None if found is None else self._sums(*found, weight, True)
+
+    def _sums(
+        self, inertia: Array, inverse: Array, weight: Array, slopes: bool
+    ) -> tuple[float, Array, Array]:
+        samples = (self.rate, self.moment, self.change, self.sampling)
+        return sums_of_squares(  # type: ignore[no-any-return]
+            inertia, inverse, *samples, self.gyroscopic, weight, slopes
+        )
 
     def _parts(self, parameters: Array) -> tuple[Array, Array, Array] | None:
-        inertia = tensor(parameters)
-        if not np.isfinite(inertia).all() or np.linalg.cond(inertia) > 1e12:
+        found = _inverted(parameters)
+        if found is None:
             return None
-        inverse: Array = np.asarray(np.linalg.inv(inertia), dtype=float)
+        inertia, inverse = found
         drive = self.moment
         if self.gyroscopic:
             drive = drive - np.cross(self.rate, self.rate @ inertia)
         acceleration = drive @ inverse
         return self.change - self.sampling * acceleration, inverse, acceleration
+
+
+def _inverted(parameters: Array) -> tuple[Array, Array] | None:
+    """(tensor, its inverse) (3, 3); None where there is none."""
+    inertia = tensor(parameters)
+    if not np.isfinite(inertia).all() or np.linalg.cond(inertia) > 1e12:
+        return None
+    return inertia, np.asarray(np.linalg.inv(inertia), dtype=float)
+
+
+@njit(cache=True)
+def sums_of_squares(  # type: ignore[no-untyped-def]
+    inertia, inverse, rate, moment, change, sampling, gyroscopic, weight, slopes
+):
+    """(cost, Hessian (6, 6), gradient (6,)) of the predictor's errors, sample by sample."""
+    cost, hessian, gradient = 0.0, np.zeros((6, 6)), np.zeros(6)
+    slope, in_error, weighted = np.empty((3, 6)), np.empty((3, 6)), np.empty((3, 6))
+    drive, turned, a, error, pull = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for n in range(rate.shape[0]):
+        w = rate[n]
+        drive[:] = moment[n]
+        if gyroscopic:
+            _times(inertia, w, turned)
+            drive[0] -= w[1] * turned[2] - w[2] * turned[1]
+            drive[1] -= w[2] * turned[0] - w[0] * turned[2]
+            drive[2] -= w[0] * turned[1] - w[1] * turned[0]
+        _times(inverse, drive, a)
+        for i in range(3):
+            error[i] = change[n, i] - sampling * a[i]
+        _times(weight, error, pull)
+        cost += error[0] * pull[0] + error[1] * pull[1] + error[2] * pull[2]
+        if not slopes:
+            continue
+        # d(J^-1 u) = -J^-1 dJ J^-1 u + J^-1 du, with du = -w x dJ w.
+        _element_times(a, slope)
+        if gyroscopic:
+            _element_times(w, weighted)
+            for k in range(6):
+                slope[0, k] += w[1] * weighted[2, k] - w[2] * weighted[1, k]
+                slope[1, k] += w[2] * weighted[0, k] - w[0] * weighted[2, k]
+                slope[2, k] += w[0] * weighted[1, k] - w[1] * weighted[0, k]
+        for k in range(6):
+            _times(inverse, slope[:, k], in_error[:, k])
+            _times(weight, in_error[:, k], weighted[:, k])
+            for i in range(3):
+                in_error[i, k] *= sampling
+                weighted[i, k] *= sampling
+                gradient[k] += pull[i] * in_error[i, k]
+        for k in range(6):
+            for m in range(6):
+                for i in range(3):
+                    hessian[k, m] += weighted[i, k] * in_error[i, m]
+    return cost, hessian, gradient
+
+
+@njit(cache=True)
+def _times(matrix, vector, out):  # type: ignore[no-untyped-def]
+    """``out`` (3,) becomes ``matrix`` (3, 3) times ``vector`` (3,): a call of BLAS takes longer."""
+    for i in range(3):
+        out[i] = matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
+
+
+@njit(cache=True)
+def _element_times(v, out):  # type: ignore[no-untyped-def]
+    """Columns of ``out`` (3, 6): each of ELEMENTS times ``v``, in their order xx xy xz yy yz zz."""
+    out[:] = 0.0
+    out[0, 0] = v[0]
+    out[0, 1], out[1, 1] = v[1], v[0]
+    out[0, 2], out[2, 2] = v[2], v[0]
+    out[1, 3] = v[1]
+    out[1, 4], out[2, 4] = v[2], v[1]
+    out[2, 5] = v[2]
 
 
 def search_minimum(
@@ -66,15 +144,10 @@ def search_minimum(
     """Minimise the weighted sum of squares; returns parameters, whether settled, iterations."""
     damping = 1e-3
     for iteration in range(1, ITERATIONS + 1):
-        parts = predictor.error_and_slope(parameters)
+        parts = predictor.normal(parameters, weight)
         if parts is None:
             return parameters, False, iteration
-        error, slope = parts
-        cost = _cost(error, weight)
-        rows = slope.reshape(-1, 6)
-        weighted = (weight @ slope).reshape(-1, 6)
-        hessian = weighted.T @ rows
-        gradient = weighted.T @ error.ravel()
+        cost, hessian, gradient = parts
         if search == "levenberg_marquardt":
             found = _damped(predictor, parameters, weight, cost, hessian, gradient, damping)
         else:
@@ -85,10 +158,6 @@ def search_minimum(
         if np.abs(step).max() <= SETTLED * np.abs(parameters).max():
             return parameters, True, iteration
     return parameters, False, ITERATIONS
-
-
-def _cost(error: Array | None, weight: Array) -> float:
-    return np.inf if error is None else float(np.sum((error @ weight) * error))
 
 
 def _direction(hessian: Array, gradient: Array, limit: float) -> Array:
@@ -104,7 +173,7 @@ def _along(
     """Halve the step until the cost is no larger (eq. 3.34)."""
     share = 1.0
     for _ in range(HALVINGS):
-        if _cost(predictor.error(parameters + share * direction), weight) <= cost:
+        if predictor.cost(parameters + share * direction, weight) <= cost:
             return share * direction, share
         share *= 0.5
     return np.zeros_like(direction), share
@@ -123,7 +192,7 @@ def _damped(
     scale = np.diag(np.diag(hessian))
     for _ in range(HALVINGS):
         step = np.asarray(-np.linalg.solve(hessian + damping * scale, gradient), dtype=float)
-        if _cost(predictor.error(parameters + step), weight) <= cost:
+        if predictor.cost(parameters + step, weight) <= cost:
             return step, max(damping / 10.0, 1e-15)
         damping *= 10.0
     return np.zeros(6), damping

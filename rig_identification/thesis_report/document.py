@@ -13,7 +13,13 @@ from rig_identification import __version__
 from rig_identification.model.modes import Mode
 from rig_identification.thesis import read_text_remarks
 from rig_identification.thesis_report.table import ELEMENTS, absolute_elements, case_rows
-from rig_identification.thesis_rerun import CaseResult, IntegratedPose, Rerun, worst_percent
+from rig_identification.thesis_rerun import (
+    CaseResult,
+    Examination,
+    IntegratedPose,
+    Rerun,
+    worst_percent,
+)
 
 
 def rerun_document(found: Rerun, seconds: float) -> dict[str, Any]:
@@ -48,6 +54,8 @@ def rerun_document(found: Rerun, seconds: float) -> dict[str, Any]:
             "within_95_percent": t.within_95,
             "freedom": t.freedom,
         }
+    if found.examination is not None:
+        document["examination"] = _examination(found.examination)
     return document
 
 
@@ -130,6 +138,30 @@ def _integrated(pose: IntegratedPose) -> dict[str, Any]:
         "center_percent_worst": np.max(np.abs(pose.center_percent), axis=0),
         "T_percent_worst": np.nanmax(np.abs(pose.T_percent), axis=0),
         "T_worst": np.max(np.abs(pose.T - pose.true_T), axis=0),
+    }
+
+
+def _examination(found: Examination) -> dict[str, Any]:
+    """The thesis' assumptions as the ideal model of a session of one case."""
+    return {
+        "case": found.case,
+        "order": "xx xy xz yy yz zz, kg m^2 about the centre of mass without the rotor",
+        "rotor_mass": found.rotor_mass,
+        "duration": found.duration,
+        "true": found.true,
+        "before": found.before,
+        "after": found.after,
+        "std": found.std,
+        "percent_before": found.percent(found.before),
+        "percent_after": found.percent(found.after),
+        "holdout_error_before": found.holdout_before,
+        "holdout_error_after": found.holdout_after,
+        "verdict": found.verdict,
+        "findings": [
+            {"effect": f.effect, "where": f.where, "parameters": f.parameters, "statement": f.statement}
+            for f in found.findings
+        ],
+        "seconds": found.seconds,
     }
 
 

@@ -37,6 +37,7 @@ def write_page(found: Rerun, figures: Figures, seconds: float, path: Path) -> No
             for label, drawn in figures.by_case.items()
         },
         tracking=found.tracking,
+        examination=found.examination,
         remarks=read_text_remarks(),
     )
     path.write_text(add_sections(page, environment, found), encoding="utf-8")

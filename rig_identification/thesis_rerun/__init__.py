@@ -3,12 +3,14 @@
 from rig_identification.thesis_rerun.comparison import Comparison, compare, signed_error, worst_percent
 from rig_identification.thesis_rerun.integration import IntegratedPose
 from rig_identification.thesis_rerun.motion import CaseMotion, fly_case
+from rig_identification.thesis_rerun.patient import Examination
 from rig_identification.thesis_rerun.rerun import CaseResult, Rerun, Trace, rerun, rerun_case
 
 __all__ = [
     "CaseMotion",
     "CaseResult",
     "Comparison",
+    "Examination",
     "IntegratedPose",
     "Rerun",
     "Trace",

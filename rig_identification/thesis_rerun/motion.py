@@ -30,8 +30,8 @@ Array = NDArray[np.float64]
 #: Nodes, s, and nodes of a block: a tenth of a second, far below any rigid mode's period.
 STEP = 0.005
 BLOCK = 20
-#: Passes over a block, and the change of force, N, at which they end.
-PASSES, AGREED = 12, 1e-6
+#: Passes over a block, and the change of force, N, at which they end; what is left is a hundredth of that.
+PASSES, AGREED = 12, 1e-4
 #: Sides of a jump, s.
 BESIDE = 1e-9
 
@@ -48,7 +48,7 @@ class CaseMotion:
     velocity: Array  # (N, 3) m/s, datum, world
     outputs: Array  # (N, 18 + n) raw outputs (model/layout.py)
     force: Array  # (N, 3) N, exciter's force along body axes
-    held_force: Array  # (N, 3) N, the nodes that the model interpolates; at a jump the mean of both sides
+    held_force: Array  # (N, 3) N, the same, but at a jump the mean of both sides
     jumps: NDArray[np.int64]  # nodes at which the force jumps
 
     @property
@@ -101,12 +101,18 @@ def case_elements(case: Case, inertia: Array | None = None) -> Array:
 
 
 def fly_case(
-    case: Case, *, inertia: Array | None = None, duration: float | None = None, agreed: float = AGREED
+    case: Case,
+    *,
+    inertia: Array | None = None,
+    duration: float | None = None,
+    agreed: float = AGREED,
+    substeps: int | None = None,
 ) -> CaseMotion:
     """Motion of a case over ``duration`` s (its own length where None), from rest in its initial pose.
 
     inertia (3, 3) kg m^2 in place of the case's: the motion that an identified tensor predicts.
-    agreed: change of force, N, at which the passes over a block end.
+    agreed: change of force, N, at which the passes over a block end. substeps: integration steps between
+    two nodes, where the model's own choice is finer than needed.
     Raises InputError where the motion leaves every bound.
     """
     model = rig_model(case.rig, case_elements(case, inertia), rods=True)
@@ -118,13 +124,16 @@ def fly_case(
     force, held = np.zeros((nodes, 3)), np.zeros((nodes, 3))
     jumps = _jumps(case, nodes)
     edges = _edges(nodes, jumps)
+    alpha, jerk = np.zeros(3), np.zeros(3)
     for first, last in pairwise(edges):
         here = slice(first, last + 1)
-        motion, plain, given = _block(case, model, state, first, last, agreed)
-        held[first] = 0.5 * (held[first] + given[0]) if first in jumps else given[0]
-        held[first + 1 : last + 1] = given[1:]
+        motion, plain = _block(case, model, state, (alpha, jerk), first, last, agreed, substeps)
+        held[first] = 0.5 * (held[first] + plain[0]) if first in jumps else plain[0]
+        held[first + 1 : last + 1] = plain[1:]
         states[here], rotations[here], out[here] = motion.states, motion.R_world_body, motion.outputs
         force[here], state = plain, motion.state(last - first)
+        turning = out[here, layout.OUT_ANGULAR_ACCELERATION : layout.OUT_ANGULAR_ACCELERATION + 3]
+        alpha, jerk = turning[-1], (turning[-1] - turning[-2]) / STEP
     return CaseMotion(
         case,
         model,
@@ -156,25 +165,40 @@ def _edges(nodes: int, jumps: NDArray[np.int64]) -> list[int]:
 
 
 def _block(  # type: ignore[no-untyped-def]
-    case: Case, model: RigModel, state: State, first: int, last: int, agreed: float
+    case: Case,
+    model: RigModel,
+    state: State,
+    turning: tuple[Array, Array],
+    first: int,
+    last: int,
+    agreed: float,
+    substeps: int | None,
 ):
-    """(motion, force (k, 3), force at the nodes that the model interpolates (k, 3)) of one block."""
+    """(motion, force (k, 3)) of one block.
+
+    turning ((3,) rad/s^2, (3,) rad/s^3), body axes: angular acceleration with which it begins and its rate,
+    or guesses of them.
+    """
     time = STEP * np.arange(first, last + 1)
     inside = time.copy()
     inside[-1] -= BESIDE
     drive = Input.none(time.size, STEP)
-    turns = state.R_world_body @ Rotation.from_rotvec(np.outer(time - time[0], state.rate)).as_matrix()
+    passed = time - time[0]
+    alpha, jerk = turning
+    turned = np.outer(passed, state.rate) + np.outer(passed**2 / 2.0, alpha) + np.outer(passed**3 / 6.0, jerk)
+    turns = state.R_world_body @ Rotation.from_rotvec(turned).as_matrix()
     force = np.zeros((time.size, 3))
     for _ in range(PASSES):
         before, force = force, _along_body(case, inside, turns)
-        given = _held(force)
-        motion = simulate(model, state, replace(drive, force=given))
+        motion = simulate(
+            model, state, replace(drive, force=force, middle=_between(force)), substeps=substeps
+        )
         if not motion.complete:
             raise InputError(f"case {case.label}: the motion leaves every bound at {time[0]:.1f} s")
         turns = motion.R_world_body
         if np.max(np.abs(force - before)) < agreed or case.force.axes == "body":
             break
-    return motion, force, given
+    return motion, force
 
 
 def _along_body(case: Case, time: Array, turns: Array) -> Array:
@@ -182,9 +206,12 @@ def _along_body(case: Case, time: Array, turns: Array) -> Array:
     return force if case.force.axes == "body" else np.asarray(np.einsum("nji,nj->ni", turns, force))
 
 
-def _held(force: Array) -> Array:
-    """(k, 3) nodes whose linear interpolation has the impulse of the smooth function through ``force``."""
+def _between(force: Array) -> Array:
+    """(k, 3) N: the smooth function through ``force`` (k, 3) midway to the next node, beyond the line."""
+    out = np.zeros_like(force)
     if len(force) < 3:
-        return force
+        return out
     bend = force[2:] - 2.0 * force[1:-1] + force[:-2]
-    return np.asarray(force - np.concatenate([bend[:1], bend, bend[-1:]]) / 12.0)
+    bend = np.concatenate([bend[:1], bend, bend[-1:]])
+    out[:-1] = -(bend[:-1] + bend[1:]) / 16.0
+    return out

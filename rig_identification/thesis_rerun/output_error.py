@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Run, prepare
+from rig_identification.estimate.evidence import NODE_STEP, Run, prepare
 from rig_identification.estimate.parameters import INERTIAL, DeviceLayout, ParameterSet
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.solve import Evaluation, Point, Problem, shortened, solve
@@ -75,7 +75,8 @@ def noise_free_run(motion: CaseMotion, window: tuple[float, float], *, force: bo
         imu=Series(time, np.concatenate([motion.rate[chosen], motion.specific_force[chosen]], axis=1)),
         inclination=Series(time, np.arcsin(up[:, :2])),
     )
-    return prepare(case.rig, recording)
+    # Samples without noise tell the finest nodes from wider ones
+    return prepare(case.rig, recording, NODE_STEP)
 
 
 def tensor_problem(motion: CaseMotion, runs: tuple[Run, ...], guess: Array) -> tuple[Problem, Array]:

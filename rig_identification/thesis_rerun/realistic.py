@@ -24,7 +24,7 @@ from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.observability import elements_covariance
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import drive, model_at
-from rig_identification.estimate.sampling import group_by_node, jumps_of, node_values
+from rig_identification.estimate.sampling import group_by_node
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.model.body import tensor
 from rig_identification.model.motion import simulate
@@ -67,11 +67,10 @@ def realistic_uncertainty(case: Case, seed: int) -> Realistic | None:
 
 def away_from_jumps(run: Run) -> Run:
     """The run without samples beside a jump of its exciter's force."""
-    if run.exciter is None:
+    if run.force is None:
         return run
     step = run.grid.step
-    force = node_values(run.grid, run.exciter.time, run.exciter.values)
-    found = np.flatnonzero(np.any(jumps_of(force, run.exciter_noise) != 0.0, axis=1))
+    found = np.flatnonzero(np.any(run.force.jumps != 0.0, axis=1))
     middles = step * (found[:, None] + 0.5)
     channels = []
     for channel in run.channels:

@@ -6,6 +6,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from rig_identification.thesis_rerun.integration import IntegrationCheck, check_
 from rig_identification.thesis_rerun.motion import CaseMotion, case_elements, fly_case
 from rig_identification.thesis_rerun.oddities import odd_statements
 from rig_identification.thesis_rerun.output_error import with_noise
+from rig_identification.thesis_rerun.patient import Examination, examine
 from rig_identification.thesis_rerun.realistic import Realistic, realistic_uncertainty
 from rig_identification.thesis_rerun.statics import StaticRerun, rerun_statics
 from rig_identification.thesis_rerun.tracking import TrackingComparison, compare_tracking
@@ -28,11 +30,16 @@ from rig_identification.thesis_rerun.wrench import WrenchAccuracy, wrench_accura
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+Job = tuple[int, str]  # a case's number and variant
 
 #: Part of each motion that is drawn, s, and samples a second.
 DRAWN, DRAWN_RATE = 20.0, 50
 #: Case whose data case 5 uses, and the case and time, s, on which the trackers are compared.
 MAPPED, TRACKED, TRACKED_FOR = 5, 10, 250.0
+#: Case that is examined with the thesis' assumptions.
+EXAMINED = 14
+#: Jobs beside the cases, by labels that no case has.
+TRACKERS, PATIENT = (0, "trackers"), (0, "patient")
 #: Case on which the thesis checks its own tracker (section 4.1.1).
 CHECKED = 1
 #: Seed of every simulated noise.
@@ -74,6 +81,7 @@ class Rerun:
     cases: tuple[CaseResult, ...]
     tracking: TrackingComparison | None
     statics: StaticRerun | None  # Table 2.1
+    examination: Examination | None = None  # the thesis' assumptions as the ideal model of a session
 
 
 def rerun_case(case: Case) -> CaseResult:
@@ -117,52 +125,45 @@ def rerun(cases: tuple[Case, ...], progress: Progress, workers: int = 2, trackin
     """
     statics = rerun_statics() if tracking else None
     jobs = [(case.number, case.variant) for case in cases]
-    if workers < 2 or len(jobs) + tracking < 2:
-        found = _in_turn(jobs, progress)
-        return Rerun(found, _track(progress) if tracking else None, statics)
-    results: dict[tuple[int, str], CaseResult] = {}
-    for label, result in _side_by_side(jobs, tracking, workers, progress):
-        results[label] = result
-    trackers = results.pop((0, ""), None)
-    return Rerun(tuple(results[job] for job in jobs), trackers, statics)  # type: ignore[arg-type]
-
-
-def _in_turn(jobs: list[tuple[int, str]], progress: Progress) -> tuple[CaseResult, ...]:
-    found = []
-    for k, job in enumerate(jobs):
-        progress(f"case {job[0]}{job[1]}", k / len(jobs))
-        found.append(_work(job))
-    return tuple(found)
-
-
-def _track(progress: Progress) -> TrackingComparison | None:
-    progress("tracker beside integration", 1.0)
-    return compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED)
-
-
-def _work(job: tuple[int, str]):  # type: ignore[no-untyped-def]
-    """A case, or the trackers for number 0: what a process is given to do."""
-    return (
-        compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED)
-        if job[0] == 0
-        else rerun_case(load_case(*job))
-    )
-
-
-def _side_by_side(
-    jobs: list[tuple[int, str]], tracking: bool, workers: int, progress: Progress
-) -> Iterator[tuple[tuple[int, str], CaseResult]]:
+    beside = [TRACKERS] * tracking + [PATIENT] * any(case.number == EXAMINED for case in cases)
     # The long ones first, so that no process ends up alone with one of them
-    order = [(0, "")] * tracking + sorted(jobs, key=lambda job: job[0] not in (3, 4, MAPPED))
+    order = [*beside, *sorted(jobs, key=lambda job: job[0] not in (3, 4, MAPPED))]
+    alone = workers < 2 or len(order) < 2
+    found: dict[Job, Any] = dict(
+        _in_turn(order, progress) if alone else _side_by_side(order, workers, progress)
+    )
+    return Rerun(tuple(found[job] for job in jobs), found.get(TRACKERS), statics, found.get(PATIENT))
+
+
+def _in_turn(jobs: list[Job], progress: Progress) -> Iterator[tuple[Job, Any]]:
+    for k, job in enumerate(jobs):
+        progress(_name(job), k / len(jobs))
+        yield job, _work(job)
+
+
+def _work(job: Job) -> Any:
+    """What a process is given to do."""
+    if job == TRACKERS:
+        return compare_tracking(load_case(TRACKED), TRACKED_FOR, SEED)
+    if job == PATIENT:
+        return examine(load_case(EXAMINED), SEED)
+    return rerun_case(load_case(*job))
+
+
+def _name(job: Job) -> str:
+    beside = {TRACKERS: "tracker beside integration", PATIENT: "the thesis' assumptions examined"}
+    return beside.get(job) or f"case {job[0]}{job[1]}"
+
+
+def _side_by_side(jobs: list[Job], workers: int, progress: Progress) -> Iterator[tuple[Job, Any]]:
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:
-            waiting = {pool.submit(_work, job): job for job in order}
+            waiting = {pool.submit(_work, job): job for job in jobs}
             while waiting:
                 done, _ = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in done:
                     job = waiting.pop(future)
-                    name = f"case {job[0]}{job[1]}" if job[0] else "tracker beside integration"
-                    progress(f"{name} done", 1.0 - len(waiting) / len(order))
+                    progress(f"{_name(job)} done", 1.0 - len(waiting) / len(jobs))
                     yield job, future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)

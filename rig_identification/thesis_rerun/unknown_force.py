@@ -90,7 +90,7 @@ def _at_sampling_rate(run: Run, sampling: float) -> Run:
     for channel in run.channels:
         group, node = group_by_node(grid, channel.time)
         channels.append(replace(channel, group=group, node=node))
-    return replace(run, grid=grid, channels=tuple(channels), exciter=None, exciter_noise=0.0)
+    return replace(run, grid=grid, channels=tuple(channels), force=None, exciter_noise=0.0)
 
 
 def _felt_force(motion: CaseMotion, window: tuple[float, float]) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig_identification.cli.commands.identify import REPORT, RESULT, identify_session
-from rig_identification.cli.commands.simulate import write_simulated
 from rig_identification.cli.output import check_output_folder
+from rig_identification.cli.simulated import write_simulated
 from rig_identification.errors import InputError
 
 if TYPE_CHECKING:

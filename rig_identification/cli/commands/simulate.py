@@ -2,28 +2,32 @@ r"""Simulate a session: bags and descriptions as from a rig, and the truth besid
 
 Writes DIR/session.yaml, DIR/rig.yaml, a bag a recording and DIR/truth.json. The body hangs on a case study
 of the thesis (--case), or on a described rig (--rig) whose inertia --body tells. Without --no-doubts the
-true rig is drawn about its description, each quantity within three of its tolerances.
+true rig is drawn about its description, each quantity within three of its tolerances. The motor's force is
+mass times radius times its speed squared. The frequencies at which the body swings by itself are printed.
+--effect adds left-out physics, which truth.json names.
 
   rig-identification simulate --case 14 --start pulled --out car
   rig-identification simulate --rig config/trifilar.yaml --mocap 120 --out trifilar \
     --body 42 0.3 0.18 -0.12 1.9 0.03 -0.05 2.4 0.02 3.6
+  rig-identification simulate --case 1 --start rest --motor 12 0.25 0.9 --plane xz --out shaken
+  rig-identification simulate --case 14 --start pulled --out rattling \
+    --effect sprung_mass.mass=40 --effect sprung_mass.position=0.9,1.2,-1.1
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rig_identification.cli.effects import effects_given
+from rig_identification.cli.simulated import write_simulated
 from rig_identification.errors import InputError
 from rig_identification.result import ELEMENTS
 
 if TYPE_CHECKING:
-    from rig_identification.recording import Session
-    from rig_identification.simulate import RunSpec, SessionSpec, Truth
+    from rig_identification.simulate import RunSpec, SessionSpec
 
-TRUTH = "truth.json"
 CASE_STARTS = ("thesis", "pulled", "rest")
 DEVICES = ("tension", "exciter", "imu", "inclinometer")
 
@@ -43,12 +47,26 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--start", choices=CASE_STARTS, help="default: thesis with --case, else pulled")
     parser.add_argument("--pull", type=float, default=0.06, help="share of the weight (default: 0.06)")
-    parser.add_argument(
+    shaken = parser.add_mutually_exclusive_group()
+    shaken.add_argument(
         "--shake",
         type=float,
         nargs=2,
         metavar=("SHARE", "HZ"),
         help="unbalanced mass: share of the weight at a speed",
+    )
+    shaken.add_argument(
+        "--motor",
+        type=float,
+        nargs=3,
+        metavar=("KG", "M", "HZ"),
+        help="unbalanced mass: mass, radius and speed",
+    )
+    parser.add_argument(
+        "--plane",
+        choices=("xy", "xz", "yz"),
+        default="xy",
+        help="of its turning, exciter frame (default: xy)",
     )
     parser.add_argument(
         "--mocap", type=float, default=0.0, metavar="HZ", help="motion capture (default: none)"
@@ -63,6 +81,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     on_or_off = argparse.BooleanOptionalAction
     parser.add_argument("--noise", action=on_or_off, default=True, help="noise of the sensors (default: on)")
     parser.add_argument("--doubts", action=on_or_off, default=True, help="a rig not quite as described")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE[,VALUE...]",
+        help="left-out physics, as hinge_damping=20 or sprung_mass.mass=30, or a device's error, as "
+        "imu.gyroscope_bias.x=0.01; an unknown name lists all; may be repeated",
+    )
     parser.add_argument("--rods", action="store_true", help="cables that push as well, as in the thesis")
     parser.add_argument("--seed", type=int, default=0, help="of every random number (default: %(default)s)")
     parser.add_argument("--storage", choices=("mcap", "sqlite3"), default="mcap")
@@ -92,7 +118,19 @@ def run(arguments: argparse.Namespace) -> None:
         if least <= 0.0:
             what = "is pushed" if arguments.rods else "goes slack"
             print(f"note: a cable {what} in {name}; pull or shake less where the ideal model is to hold")
+    for line in _modes(spec):
+        print(line)
     print(f"session: {arguments.out}")
+
+
+def _modes(spec: SessionSpec) -> list[str]:
+    """How the body swings by itself on the rig as described."""
+    from rig_identification.model.modes import natural_modes
+    from rig_identification.model.motion import rig_model
+    from rig_identification.simulate.start import rest_state
+
+    model = rig_model(spec.rig, spec.elements, rods=spec.rods)
+    return [f"swings at {m.frequency:.3f} Hz: {m.shape}" for m in natural_modes(model, rest_state(model))]
 
 
 def specification(arguments: argparse.Namespace) -> SessionSpec:
@@ -114,6 +152,7 @@ def specification(arguments: argparse.Namespace) -> SessionSpec:
         noise=arguments.noise,
         doubts=arguments.doubts,
         rods=arguments.rods,
+        effects=effects_given(arguments.effect),
         runs=tuple(_moved(arguments, spec, run, i) for i, run in enumerate(spec.runs)),
     )
 
@@ -171,47 +210,29 @@ def _moved(arguments: argparse.Namespace, spec: SessionSpec, run: RunSpec, numbe
         hinges = np.array([cable.body_point for cable in spec.rig.cables])
         aside = 0.15 * np.ptp(hinges, axis=0) * (1.0 - 2.0 * number)
         run = replace(run, start=Pulled(force, spec.elements[1:4] + aside))
-    if arguments.shake is None:
+    shaken = _unbalance(arguments, weight)
+    if shaken is None:
         return run
     if spec.rig.exciter is None:
-        raise InputError("--shake: the rig description mounts no exciter; add one, or leave --shake out")
+        raise InputError("--shake, --motor: the rig description mounts no exciter; add one, or leave it out")
+    unbalance, frequency = shaken
+    motor = UnbalancedMass(unbalance, frequency, arguments.plane, ramp=3.0, angle=float(number))
+    return replace(run, force=motor)
+
+
+def _unbalance(arguments: argparse.Namespace, weight: float) -> tuple[float, float] | None:
+    """(kg m, Hz) of the motor that is asked for; None: none."""
+    import math
+
+    if arguments.motor is not None:
+        mass, radius, frequency = arguments.motor
+        if not (mass > 0.0 and radius > 0.0 and 0.0 < frequency <= 20.0):
+            text = f"--motor {mass:g} {radius:g} {frequency:g}"
+            raise InputError(f"{text}: give mass and radius above 0 and a speed up to 20 Hz")
+        return mass * radius, frequency
+    if arguments.shake is None:
+        return None
     share, frequency = arguments.shake
     if not (share > 0.0 and 0.0 < frequency <= 20.0):
         raise InputError(f"--shake {share:g} {frequency:g}: give a share above 0 and a speed up to 20 Hz")
-    unbalance = share * weight / (2.0 * np.pi * frequency) ** 2
-    return replace(run, force=UnbalancedMass(unbalance, frequency, "xy", ramp=3.0, angle=float(number)))
-
-
-def write_simulated(session: Session, truth: Truth, folder: Path, **options: Any) -> None:
-    """The session as bags, and what is true of it as ``truth.json``.
-
-    Raises
-    ------
-    InputError
-        The folder exists or cannot be written to.
-    """
-    from rig_identification.session import write_session
-
-    try:
-        write_session(session, folder, **options)
-        (folder / TRUTH).write_text(json.dumps(truth_document(truth), indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"--out {folder}: {reason}; name another folder") from error
-
-
-def truth_document(truth: Truth) -> dict[str, Any]:
-    """Truth in the words of the result."""
-    from rig_identification.model.body import tensor
-
-    return {
-        "mass": float(truth.elements[0]),
-        "center_of_mass": truth.elements[1:4].tolist(),
-        "inertia": tensor(truth.elements[4:]).tolist(),
-        "effects": [],
-        "parameters": {
-            name: {"value": value, "described": truth.described[name]}
-            for name, value in truth.parameters.items()
-        },
-        "least_tension": truth.least_tension,
-    }
+    return share * weight / (2.0 * math.pi * frequency) ** 2, frequency

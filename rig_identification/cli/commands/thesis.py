@@ -2,7 +2,8 @@
 
 Writes DIR/thesis.json, DIR/report.html and an SVG for each figure, all or none. Each case is simulated
 without noise; (a) is the thesis' own estimator, (b) has the gyroscopic term, (c) is a regression on momentum,
-and (d) is this package's estimator, with its standard deviation under realistic noise.
+and (d) is this package's estimator, with its standard deviation under realistic noise. With case 14 comes
+a session of it that is examined with the thesis' assumptions.
 
   rig-identification thesis --out thesis
   rig-identification thesis --case 14 --case 18b --out civic
@@ -71,6 +72,8 @@ def run(arguments: argparse.Namespace) -> None:
         },
     )
     print(text_table(found))
+    if found.examination is not None:
+        print(found.examination.statement)
     print(f"report: {arguments.out / REPORT}")
 
 

@@ -8,6 +8,7 @@ from rig_identification.model.effects.air_added_mass import add_air_added_mass
 from rig_identification.model.effects.air_drag import add_air_drag
 from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
+from rig_identification.model.effects.gyroscopic_share import add_gyroscopic_share
 from rig_identification.model.effects.hinge_damping import add_hinge_damping
 from rig_identification.model.effects.hinge_friction import add_hinge_friction
 from rig_identification.model.effects.internal import add_internal
@@ -16,8 +17,10 @@ from rig_identification.model.effects.place import (
     DAMPING,
     DRAG_AREA,
     FRICTION,
+    GYROSCOPIC_SHARE,
     LINEAR_DENSITY,
     ROTOR_MASS,
+    TETHER_POINT,
     active,
 )
 from rig_identification.model.effects.tether import add_tether
@@ -30,10 +33,23 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     block = CABLES + CABLE_SIZE * modes.shape[0]
     if physics.shape[0] <= block:
         return False, False, False, False
-    air = active(physics[block + DRAG_AREA]) or active(physics[block + ADDED_MASS])
+    body = active(physics[block + DRAG_AREA]) or active(physics[block + ADDED_MASS])
+    body = body or active(physics[block + GYROSCOPIC_SHARE])
     rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
-    return air, rotor or rods or internal > 0, rotor, rods or hinges
+    return body, rotor or rods or internal > 0, rotor, rods or hinges
+
+
+@njit(cache=True)
+def effects_act(physics, modes):  # type: ignore[no-untyped-def]
+    """Whether any effect of the block acts on the body."""
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    if physics.shape[0] <= block:
+        return False
+    acting = False
+    for i in range(TETHER_POINT):
+        acting = acting or active(physics[block + i])
+    return acting
 
 
 @njit(cache=True)
@@ -47,6 +63,7 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     add_air_drag(physics, block, x, R, r)
     add_air_added_mass(physics, block, x, K, r)
     add_exciter_rotor(physics, block, x, R, K, r)
+    add_gyroscopic_share(physics, block, x, r)
     add_cable_mass(physics, block, modes, x, R, K, r)
     add_tether(physics, block, x, R, r)
     add_internal(physics, block, modes, x, R, K, r)

@@ -51,9 +51,9 @@ from rig_identification.model.layout import (
     STOP,
 )
 
-#: Stops are springs that are this much stiffer than what turns a mass of 1 Hz, and damp like 0.1 of critical.
-STOP_FREQUENCY = 12.0
-STOP_DAMPING = 0.1
+#: Stops are springs on which the rider would swing at this frequency (Hz), and damp like wood.
+STOP_FREQUENCY = 20.0
+STOP_DAMPING = 0.3
 
 
 @njit(cache=True)

@@ -9,19 +9,21 @@ from numba import njit
 
 from rig_identification.model.layout import CABLE_SIZE, CABLES, INTERNAL_SIZE
 
+# Amounts first: where all of them are zero, no effect acts
 DAMPING = 0  # N m s/rad
 FRICTION = 1  # N m
 DRAG_AREA = 2  # m^2
 ADDED_MASS = 3  # kg
 ROTOR_MASS = 4  # kg
 LINEAR_DENSITY = 5  # kg/m
-TETHER_STIFFNESS = 6  # 3: N/m, world axes
-TETHER_PULL = 9  # 3: N, world axes
-TETHER_POINT = 12  # 3: m, body
-REFERENCE_POSITION = 15  # 3: m, world
-REFERENCE_ROTATION = 18  # 9: rotation matrix, row by row
-SHARING = 27  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-EFFECTS_SIZE = 28
+GYROSCOPIC_SHARE = 6  # 1: share of the gyroscopic moment that the model lacks
+TETHER_STIFFNESS = 7  # 3: N/m, world axes
+TETHER_PULL = 10  # 3: N, world axes
+TETHER_POINT = 13  # 3: m, body
+REFERENCE_POSITION = 16  # 3: m, world
+REFERENCE_ROTATION = 19  # 9: rotation matrix, row by row
+SHARING = 28  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+EFFECTS_SIZE = 29
 
 
 def effects_block(cables: int) -> int:

@@ -1,0 +1,53 @@
+"""What a search ends with: a fit with effects in it, and what is told of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.solve import excess
+from rig_identification.result import Mismatch
+
+#: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
+#: model of a swinging liquid or a dry hinge is perfect.
+TRACE, TRACE_SQUARE = 0.01, 1.03
+
+
+@dataclass(frozen=True)
+class Explained:
+    """A fit with effects in it; beside it the cautious fit of the ideal model where that was needed."""
+
+    fitted: Fitted
+    mismatch: Mismatch
+    ideal: Ideal
+    loose: float = 1.0  # factor on every variance where a trace is left
+    trace: bool = False  # whether something is left at all, be it next to nothing
+
+
+def only_a_trace(ideal: Fitted, fitted: Fitted, square: float = TRACE_SQUARE) -> bool:
+    """Whether what ``fitted`` leaves is next to nothing beside what the ``ideal`` model leaves.
+
+    square: mean square of whitened residuals up to which it may be.
+    """
+    share = excess(fitted.evaluation) / max(excess(ideal.evaluation), 1.0)
+    return fitted.converged and share < TRACE and misfit(fitted.evaluation) < square
+
+
+def held_out_errors(before: float | None, after: float | None) -> str:
+    """The two errors that a person asks for first, as a sentence."""
+
+    def number(value: float | None) -> str:
+        return "not known" if value is None else f"{value:.3g}"
+
+    return f"Held-out error {number(before)} before, {number(after)} after (1 is a perfect model)."
+
+
+def evidence_of(ideal: Ideal, fitted: Fitted, after: float | None) -> dict[str, float | None]:
+    """``evidence`` of a finding: what the fit with it gains over the ideal model's. after: held-out error."""
+    return {
+        "log_likelihood_gain": float(ideal.fitted.evaluation.cost - fitted.evaluation.cost),
+        "holdout_error_before": ideal.scores.holdout,
+        "holdout_error_after": after,
+    }

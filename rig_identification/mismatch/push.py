@@ -1,0 +1,71 @@
+"""A push: something outside acts for seconds and is gone. The rest of the session is fitted without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.identify import Ideal, judged
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.whole import fit_whole
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
+from rig_identification.mismatch.locate import Event, find_event
+from rig_identification.mismatch.search import mass_of
+from rig_identification.mismatch.unknown import push_finding
+from rig_identification.result import Mismatch
+
+Notify = Callable[[str, float], None]
+
+#: How uneven pieces must be (worst over median mean square) for an event to be looked for.
+UNEVEN = 4.0
+#: What is cut off on either side of a push, s.
+MARGIN = 0.15
+
+
+def without_push(
+    ideal: Ideal, problem: Problem, here: Problem, evaluation: Evaluation, notify: Notify
+) -> Explained | None:
+    """The session without the seconds in which something pushed; None where nothing did, or more is wrong.
+
+    problem: whole runs. here, evaluation: their short pieces, fitted.
+    """
+    squares = [float(np.mean(run.residual**2)) for run in evaluation.runs]
+    if max(squares) < UNEVEN * float(np.median(squares)):
+        return None
+    notify("search: a push", 0.05)
+    event = find_event(here, evaluation)
+    if event is None:
+        return None
+    mass = mass_of(here, evaluation)
+    at = replace(evaluation, point=event.point)
+    told = push_finding(here, at, ideal.fitted.rest, mass, event)
+    if told is None:
+        return None
+    push, start, end = told
+    parts = tuple(part for run in problem.runs for part in _without(run, event, start, end))
+    whole = replace(problem, runs=parts)
+    fitted = fit_whole(ideal.fitted, whole, here, event.point)
+    after, verdict = judged(fitted)
+    if verdict.verdict != "none":
+        return None
+    evidence = evidence_of(ideal, fitted, after.holdout)
+    text = f"Outside the push every residual is noise. {held_out_errors(ideal.scores.holdout, after.holdout)}"
+    return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
+
+
+def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
+    """A run's stretches before and after a push, where they are long enough to say something."""
+    if run.recording.name != event.recording:
+        return [run]
+    step = run.grid.step
+    a = round((start - MARGIN - run.offset) / step)
+    b = round((end + MARGIN - run.offset) / step)
+    out = []
+    if a * step > 1.0:
+        out.append(run.between(0, a))
+    if (run.grid.nodes - 1 - b) * step > 1.0:
+        out.append(run.between(b, run.grid.nodes - 1))
+    return out

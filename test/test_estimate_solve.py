@@ -1,0 +1,109 @@
+"""Steps of the fit: the best one within every bound, whatever direction Newton's points in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+from test_estimate_prediction import recorded, vector_of
+from test_model_rigs import random_sample
+
+from rig_identification.estimate.identify import pose_problem
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import (
+    Point,
+    Problem,
+    _along_valley,
+    _bounded_step,
+    _in_box,
+    _moved,
+    evaluate,
+)
+
+#: Std of a doubt's prior that the tests let it lie off.
+BOUND = 0.4
+
+
+@pytest.fixture(scope="module")
+def fit() -> tuple[Problem, Point]:
+    """Two seconds of a session at a body 3 % too heavy, which no rig within these bounds makes up for."""
+    session, truth = recorded(random_sample(3, 3), seed=4, duration=3.0)
+    problem, _, _ = pose_problem(session)
+    theta = vector_of(problem, truth)
+    theta[INERTIAL:] = 0.0
+    theta[:INERTIAL] = problem.bench.parameters.start(truth.elements * [1.03, *[1.0] * 9])[:INERTIAL]
+    problem = replace(problem, runs=(problem.runs[0].until(2.0),), rests=(), bound=BOUND)
+    return problem, Point(theta, (truth.starts["run_1"],), ())
+
+
+def test_a_step_is_the_best_within_every_bound(fit: tuple[Problem, Point]) -> None:
+    problem, point = fit
+    problem = replace(problem, stride=np.inf)
+    current = evaluate(problem, point)
+    assert current is not None
+    p = problem.bench.parameters.size
+    step = _bounded_step(problem, current, 0.0)
+    bounded = np.array([q.bounded for q in problem.bench.parameters.free])
+    reached = (point.theta + step[:p])[INERTIAL:]
+    assert np.all(np.abs(reached[bounded]) <= BOUND + 1e-9)
+    at_bound = np.zeros(step.size, dtype=bool)
+    at_bound[INERTIAL:p] = bounded & (np.abs(reached) > BOUND - 1e-9)
+    assert np.count_nonzero(at_bound) >= 3
+    # Karush, Kuhn and Tucker: nothing inside wants to move, what lies at a bound wants to go further out
+    pull = current.gradient - current.information @ step
+    scale = np.sqrt(np.diag(current.information))
+    assert np.max(np.abs(pull / scale)[~at_bound]) < 1e-5
+    assert np.all(np.sign(reached[at_bound[INERTIAL:p]]) * pull[at_bound] > 0.0)
+    assert current.gradient @ step - 0.5 * step @ current.information @ step > 0.0
+
+
+def test_residuals_without_derivatives_are_the_same(fit: tuple[Problem, Point]) -> None:
+    problem, point = fit
+    whole, quick = evaluate(problem, point), evaluate(problem, point, residuals_only=True)
+    assert whole is not None
+    assert quick is not None
+    np.testing.assert_allclose(quick.runs[0].residual, whole.runs[0].residual, rtol=0.0, atol=1e-9)
+    assert quick.cost == pytest.approx(whole.cost, rel=1e-12)
+
+
+def test_a_bent_step_follows_the_valley(fit: tuple[Problem, Point]) -> None:
+    """Where residuals are curved along a step, one that knows its second order wins more."""
+    problem, point = fit
+    problem = replace(problem, bound=np.inf, stride=np.inf)
+    current = evaluate(problem, point)
+    assert current is not None
+    straight = _bounded_step(problem, current, 0.0)
+    bent = _along_valley(problem, current, 0.0, straight)
+    assert np.any(bent != straight)
+
+    def cost(change: np.ndarray) -> float:
+        there = evaluate(problem, _moved(problem, current, change), residuals_only=True)
+        assert there is not None
+        return there.cost
+
+    assert cost(bent) < cost(straight) < current.cost
+
+
+def test_a_quadratic_in_a_box_is_minimised() -> None:
+    rng = np.random.default_rng(5)
+    for size in (1, 3, 12, 40):
+        for _ in range(20):
+            root = rng.normal(size=(size, size)) * np.exp(2.0 * rng.normal(size=size))
+            matrix = root @ root.T + 1e-3 * np.eye(size)
+            right = matrix @ rng.normal(scale=3.0, size=size)
+            low, high = -rng.uniform(0.1, 2.0, size), rng.uniform(0.1, 2.0, size)
+            x = _in_box(matrix, right, low, high)
+            assert np.all((x >= low) & (x <= high))
+            known = lsq_linear(
+                np.linalg.cholesky(matrix).T,
+                np.linalg.solve(np.linalg.cholesky(matrix), right),
+                (low, high),
+                method="bvls",
+            ).x
+
+            def cost(x: np.ndarray, matrix: np.ndarray = matrix, right: np.ndarray = right) -> float:
+                return float(0.5 * x @ matrix @ x - right @ x)
+
+            assert cost(x) <= cost(known) + 1e-8 * abs(cost(known))

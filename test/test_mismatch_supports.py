@@ -1,0 +1,99 @@
+"""What gives way is found from far off; what recordings at rest and the scale say counts in a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.growing import misfit, settled_starts
+from rig_identification.estimate.identify import fit_session, judged, pose_problem
+from rig_identification.estimate.launch import Launch
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.verdict import weighed_otherwise
+from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.search import Amount, attempt, mass_of
+from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
+from rig_identification.recording import Series, Session
+from rig_identification.simulate import simulate_session
+
+#: N: the body bounces at some 30 Hz.
+STIFFNESS = 2e7
+
+
+@pytest.fixture(scope="module")
+def inextensible() -> tuple[Problem, Evaluation]:
+    """A session on cables that stretch, seen by a model of cables that do not; all else as it is."""
+    spec = replace(shaken(14, 4.0), effects={"cable_elasticity": (STIFFNESS,)}, doubts=False)
+    session, truth = simulate_session(spec, np.random.default_rng(5))
+    problem, theta, _ = pose_problem(session)
+    launch = Launch(problem, theta).from_rest().from_momentum()
+    assert launch.rest is not None
+    problem = with_reference(problem, launch.rest)
+    point = replace(launch.point(), theta=problem.bench.parameters.start(truth.elements))
+    found = evaluate(problem, replace(point, starts=settled_starts(problem, point)))
+    assert found is not None
+    return problem, found
+
+
+@pytest.mark.parametrize("start", [0.25, 4.0])
+def test_the_amount_of_stretch_is_found_from_far_off(
+    inextensible: tuple[Problem, Evaluation], start: float
+) -> None:
+    problem, evaluation = inextensible
+    mass = mass_of(problem, evaluation)
+    elasticity = cable_elasticity(problem.bench.rig, problem.bench.parameters.model, mass)
+    amount = Amount(problem, evaluation, elasticity, "cable.axial_stiffness")
+    promise = amount.refined(amount.best([start * STIFFNESS, 1.8 * STIFFNESS]))
+    assert promise.values["cable.axial_stiffness"] == pytest.approx(STIFFNESS, rel=0.3)
+    trial = attempt(problem, evaluation, promise)
+    assert trial is not None
+    assert misfit(trial.evaluation) < 1.1 < misfit(evaluation)
+    parameters = trial.problem.bench.parameters
+    found = dict(
+        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
+    )
+    assert found["cable.axial_stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
+
+
+def test_the_usual_stiffness_is_within_what_wire_and_rope_have() -> None:
+    """A car on steel cables 4 to 16 mm thick: EA from 1e6 to 2e7 N."""
+    rig = shaken(14).rig
+    assert 1e6 < usual_stiffness(rig, 1000.0) < 2e7
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    return simulate_session(shaken(14), np.random.default_rng(23))[0]
+
+
+@pytest.fixture(scope="module")
+def fitted(session: Session) -> Fitted:
+    return fit_session(session)
+
+
+def test_a_clean_session_is_judged_clean(fitted: Fitted) -> None:
+    assert judged(fitted)[1].verdict == "none"
+    assert weighed_otherwise(fitted) is None
+
+
+def test_a_level_that_moved_between_two_recordings_at_rest_is_seen(session: Session) -> None:
+    """20 mrad in one recording alone: no zero of the instrument explains it."""
+    first = session.statics[0]
+    assert first.inclination is not None
+    moved = Series(first.inclination.time, first.inclination.values + np.array([0.02, 0.0]))
+    statics = {first.name: replace(first, inclination=moved)}
+    recordings = tuple(statics.get(r.name, r) for r in session.recordings)
+    mismatch = judged(fit_session(replace(session, recordings=recordings)))[1]
+    assert mismatch.verdict == "unexplained"
+    assert "at rest in" in mismatch.explanation.lower()
+
+
+def test_what_the_scale_contradicts_is_said(fitted: Fitted) -> None:
+    mass = float(fitted.problem.bench.parameters.elements(fitted.evaluation.point.theta)[0])
+    heavier = replace(fitted, problem=replace(fitted.problem, mass=(mass + 30.0, 0.5)))
+    assert "the scale says" in (weighed_otherwise(heavier) or "")
+    assert judged(heavier)[1].verdict == "unexplained"
