@@ -21,10 +21,10 @@ from rig_identification.estimate.solve import (
     Evaluation,
     Point,
     Problem,
-    fit_start,
     shortened,
     solve,
 )
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]

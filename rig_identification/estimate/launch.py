@@ -13,7 +13,8 @@ from rig_identification.estimate.momentum import balance, regress
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.rest_evidence import coarsened
-from rig_identification.estimate.solve import Point, Problem, fit_start, solve
+from rig_identification.estimate.solve import Point, Problem, solve
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
 from rig_identification.model import layout, sensors
 from rig_identification.model.motion import State
@@ -81,15 +82,20 @@ def tracked(bench: Bench, run: Run, theta: Array, rest: State) -> Track | None:
     size = float(np.max(extent(bench.rig)))
     noise = wrench_noise(physics[layout.INERTIAL], bench.rig.gravity, size, run.grid.step, SHARE)
     start = launch_state(bench, run, theta, rest, noise)
-    return track(bench, run, theta, start, start_covariance(0.02, 0.05), noise)
+    return track(bench, run, theta, start, start_covariance(0.02, 0.05), noise, DOUBTED)
 
 
 #: Horizons (s) over which a start state is found, a random wrench standing for what is not known.
 LAUNCHES = (0.2, 0.5, 1.0)
+#: How far rig and devices may be off while nothing is known, in tolerances: what is still ordinary.
+DOUBTED = 3.0
 
 
 def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array | None = None) -> State:
-    """Start state of a run: within a fifth of the cables' length of rest, by its first second."""
+    """Start state of a run: within a fifth of the cables' length of rest, by its first second.
+
+    noise (6, 6): random wrench, given where nothing is known yet; rig and devices are then doubted too.
+    """
     length = float(np.mean([cable.length for cable in bench.rig.cables]))
     start = rest
     if bench.mocap is not None:
@@ -99,7 +105,14 @@ def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array
         start = rest if seen is None else seen
     for end in LAUNCHES:
         found = fit_start(
-            bench, run.until(end), theta, start, tolerance=1e-2, extra_noise=noise, spread=0.2 * length
+            bench,
+            run.until(end),
+            theta,
+            start,
+            tolerance=1e-2,
+            extra_noise=noise,
+            spread=0.2 * length,
+            doubted=0.0 if noise is None else DOUBTED,
         )
         if found is not None:
             start = found[1]

@@ -17,7 +17,8 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent, headings, mocap_mount, rest_of, start_from_mocap
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
-from rig_identification.estimate.solve import Point, Problem, fit_start, solve
+from rig_identification.estimate.solve import Point, Problem, solve
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
 from rig_identification.model.sensors import MOCAP_SIZE
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.sampling import LOCAL, sample_noise_std
-from rig_identification.estimate.solve import Evaluation, Point, Problem, fit_start, solve
+from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]

@@ -424,60 +424,6 @@ def solve(
     return current, False
 
 
-def fit_start(
-    bench: Bench,
-    run: Run,
-    theta: Array,
-    start: State,
-    *,
-    iterations: int = 20,
-    tolerance: float = 1e-3,
-    extra_noise: Array | None = None,
-    spread: float = np.inf,
-    polish: float = 0.0,
-) -> tuple[Linearised, State] | None:
-    """The run's own start state alone, everything else held: what a held-out run may be given.
-
-    extra_noise (6, 6): see :func:`linearise_run`. spread: std of a prior on the start about
-    ``start`` (m, rad; twice as much m/s, rad/s). polish: see :func:`solve`.
-    """
-    p = bench.parameters.size
-    model = model_at(bench.parameters, theta)
-
-    def attempt(state: State) -> Linearised | None:
-        return linearise_run(bench, run, theta, state, start_only=True, extra_noise=extra_noise)
-
-    current = attempt(start)
-    if current is None:
-        return None
-    damping, moved_so_far = 1e-9, np.zeros(current.jacobian.shape[1] - p)
-    dof = moved_so_far.size // 2
-    weight = (START_UNIT / spread / np.repeat([1.0, 2.0], dof)) ** 2
-    for _ in range(iterations):
-        columns = current.jacobian[:, p:]
-        information = columns.T @ columns + np.diag(weight)
-        gradient = columns.T @ current.residual - weight * moved_so_far
-        damped = information + damping * np.diag(np.diag(information))
-        change = np.linalg.lstsq(damped, gradient, rcond=1e-12)[0]
-        if 0.5 * float(change @ gradient) < tolerance:
-            break
-        moved = on_cables(model, start.moved(start_basis(model, start) @ change))
-        trial = attempt(moved)
-        further = moved_so_far + change
-        prior_change = 0.5 * float(weight @ (further**2 - moved_so_far**2))
-        if trial is not None and trial.cost + prior_change < current.cost + 1e-9 * abs(current.cost):
-            won = current.cost - trial.cost
-            current, start, moved_so_far, damping = trial, moved, further, max(damping * 0.1, 1e-12)
-            left = 0.5 * float(current.residual @ current.residual - current.residual.size)
-            if max(won, tolerance) < polish * left:
-                break
-        else:
-            damping = max(damping, 1e-6) * 10.0
-            if damping > 1e6:
-                break
-    return current, start
-
-
 def shortened(problem: Problem, end: float) -> Problem:
     """The same problem on the first ``end`` seconds of every run."""
     return replace(problem, runs=tuple(run.until(end) for run in problem.runs))

@@ -8,13 +8,14 @@ and gravity is seen by accelerometer and inclinometer, so that nothing drifts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.prediction import Bench, linearise_run, model_at, smoothed
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.prediction import Bench, Linearised, linearise_run, model_at, smoothed
 from rig_identification.model import layout
 from rig_identification.model.motion import State, on_cables
 
@@ -22,6 +23,10 @@ Array = NDArray[np.float64]
 
 #: Length of a block (s): a tenth of the shortest rigid-body period of vehicle rigs.
 BLOCK = 0.1
+#: Time (s) over which a reading's mean is believed as far as rig and device are: a swing of such rigs.
+SETTLING = 1.0
+
+Row = tuple[int, int]  # index into run.channels, column within the channel
 
 
 @dataclass(frozen=True)
@@ -52,14 +57,53 @@ def start_covariance(spread: float = 0.05, speed: float = 0.2) -> Array:
     return np.diag([spread**2] * 6 + [speed**2] * 6)
 
 
+def doubted_variance(bench: Bench, run: Run, theta: Array, start: State, doubted: float) -> dict[Row, float]:
+    """Variance of each reading for what rig and devices may be off by, as if it were noise.
+
+    Such an error is constant, and a filter would believe it to be averaged away. It is given the variance
+    with which the mean of :data:`SETTLING` seconds is as uncertain as the error itself. doubted: its std in
+    tolerances. The sensitivities are those of the first second about ``start``.
+    """
+    if doubted == 0.0:
+        return {}
+    early = run.until(SETTLING)
+    lin = linearise_run(bench, early, theta, start)
+    if lin is None:
+        return {}
+    doubts = lin.jacobian[:, INERTIAL : bench.parameters.size]
+    each = doubted**2 * np.sum(doubts**2, axis=1) * lin.variance
+    out = {}
+    for channel in np.unique(lin.channel):
+        for axis in np.unique(lin.axis[lin.channel == channel]):
+            rows = (lin.channel == channel) & (lin.axis == axis)
+            rate = np.count_nonzero(rows) / max(early.grid.duration, early.grid.step)
+            out[int(channel), int(axis)] = float(np.mean(each[rows])) * max(1.0, rate * SETTLING)
+    return out
+
+
+def _doubting(lin: Linearised, more: dict[Row, float]) -> Linearised:
+    """The same with the variance of each row enlarged."""
+    if not more:
+        return lin
+    added = [more.get((int(c), int(a)), 0.0) for c, a in zip(lin.channel, lin.axis, strict=True)]
+    return replace(lin, variance=lin.variance + np.array(added))
+
+
 def track(
-    bench: Bench, run: Run, theta: Array, start: State, start_spread: Array, noise: Array
+    bench: Bench,
+    run: Run,
+    theta: Array,
+    start: State,
+    start_spread: Array,
+    noise: Array,
+    doubted: float = 0.0,
 ) -> Track | None:
     """Track a run from ``start``; None where the motion cannot be followed.
 
     start_spread (12, 12): covariance of the start. noise (6, 6): covariance of the random
-    wrench over one node interval (:func:`wrench_noise`).
+    wrench over one node interval (:func:`wrench_noise`). doubted: see :func:`doubted_variance`.
     """
+    more = doubted_variance(bench, run, theta, start, doubted)
     model = model_at(bench.parameters, theta)
     nodes = run.grid.nodes
     block = max(8, round(BLOCK / run.grid.step))
@@ -76,6 +120,7 @@ def track(
         lin = linearise_run(bench, part, theta, state, start_only=True, extra_noise=noise)
         if lin is None:
             return None
+        lin = _doubting(lin, more)
         corrections, wrench, filtered = smoothed(lin, P)
         if not np.all(np.isfinite(corrections)):
             return None

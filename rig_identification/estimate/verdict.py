@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from rig_identification.estimate.constancy import Departure, departure, shared_information
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
@@ -50,18 +51,14 @@ def residual_witnesses(run: Run, linearised: Linearised, residual: Array) -> lis
     return out
 
 
-def predictive_residual(fitted: Fitted, full: Linearised) -> Array:
+def predictive_residual(shared: Array, full: Linearised) -> Array:
     """Held-out innovations less what the parameters' own uncertainty accounts for.
 
-    The fit's posterior N(theta, information^-1) is carried into the held-out run: the
-    residual that stays after the best step within it (and in the run's own start) is what
-    no parameter inside its stated uncertainty explains.
+    The fit's posterior N(theta, shared^-1) is carried into the held-out run: the residual that stays after
+    the best step within it (and in the run's own start) is what no parameter inside its stated
+    uncertainty explains.
     """
-    p = fitted.problem.bench.parameters.size
-    information = fitted.evaluation.information
-    shared = information[:p, :p] - information[:p, p:] @ np.linalg.solve(
-        information[p:, p:], information[p:, :p]
-    )
+    p = shared.shape[0]
     normal = full.jacobian.T @ full.jacobian
     normal[:p, :p] += shared
     step = np.linalg.lstsq(normal, full.jacobian.T @ full.residual, rcond=1e-14)[0]
@@ -87,27 +84,52 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
     return out
 
 
-def all_witnesses(fitted: Fitted) -> list[Witness]:
-    """Band powers of every channel of every run, fitted and held out."""
+@dataclass(frozen=True)
+class Heard:
+    """What every run says of a fit."""
+
+    witnesses: list[Witness]
+    departures: list[Departure]  # of held-out runs
+
+    @property
+    def tests(self) -> int:
+        """How many there are."""
+        return len(self.witnesses) + len(self.departures)
+
+    def unlikely(self, log10_p: float) -> bool:
+        """Whether chance, of so many tests, hardly ever goes so far."""
+        return log10_p < float(np.log10(FALSE_ALARM / max(1, self.tests)))
+
+    def contradicting(self) -> list[Departure]:
+        """Held-out runs that ask for other parameters."""
+        return [d for d in self.departures if self.unlikely(d.log10_p)]
+
+
+def hear(fitted: Fitted) -> Heard:
+    """Band powers of every channel of every run, fitted and held out; what held-out runs ask for."""
     witnesses: list[Witness] = []
+    departures: list[Departure] = []
     for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
         witnesses += residual_witnesses(run, linearised, linearised.residual)
+    shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
     for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
         start = linearised.motion.state(0)
         full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
         if full is not None:
-            witnesses += residual_witnesses(run, full, predictive_residual(fitted, full))
-    return witnesses
+            witnesses += residual_witnesses(run, full, predictive_residual(shared, full))
+            departures.append(departure(run.recording.name, shared, full))
+    return Heard(witnesses, departures)
 
 
-def loudest(fitted: Fitted) -> float:
-    """Largest power of a band whose residual is not noise, in units of white noise; 1 where there is none.
+def looseness(fitted: Fitted) -> float:
+    """How many times too much a fit claims to know: 1 where its residuals are noise.
 
-    A model that leaves such a band claims so many times too much of what it reads there.
+    The largest power of a band that is not noise, in units of white noise, or the variance of what held-out
+    runs ask for beyond their fit's, whichever is larger.
     """
-    witnesses = all_witnesses(fitted)
-    limit = np.log10(FALSE_ALARM / max(1, len(witnesses)))
-    return max([1.0, *(w.band.power for w in witnesses if w.band.log10_p < limit)])
+    heard = hear(fitted)
+    loud = [w.band.power for w in heard.witnesses if heard.unlikely(w.band.log10_p)]
+    return max([1.0, *loud, *(d.excess for d in heard.contradicting())])
 
 
 def weighed_otherwise(fitted: Fitted) -> str | None:
@@ -143,22 +165,27 @@ def judge(
     ordinary: float,
 ) -> Mismatch:
     """Verdict ``none`` or ``unexplained`` with its reason."""
-    witnesses = all_witnesses(fitted)
+    heard = hear(fitted)
+    witnesses = heard.witnesses
     pressed = _pressed(fitted, ordinary)
     heavy = weighed_otherwise(fitted)
     beyond = [p for p in parameters if p.name in pressed]
     reasons = []
     if witnesses:
         worst = min(witnesses, key=lambda w: w.band.log10_p)
-        limit = np.log10(FALSE_ALARM / len(witnesses))
-        if worst.band.log10_p < limit:
+        if heard.unlikely(worst.band.log10_p):
             where = worst.channel + (f" {worst.axis}" if worst.axis else "")
             reasons.append(
                 f"the residual of {where} in {worst.recording} is not noise: "
                 f"between {worst.band.low:.2g} and {worst.band.high:.2g} Hz "
                 f"it has {worst.band.power:.3g} times the power of white noise"
             )
-    reasons += _restless(fitted, len(witnesses) + len(fitted.problem.rests))
+    for d in heard.contradicting():
+        reasons.append(
+            f"{d.recording}, held out, asks for other parameters than the fitted ones: squared deviations "
+            f"come to {d.statistic:.3g} where {d.directions} are to be expected"
+        )
+    reasons += _restless(fitted, heard.tests + len(fitted.problem.rests))
     if not fitted.converged:
         reasons.append("the fit did not settle")
     if heavy is not None:

@@ -19,7 +19,7 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
-from rig_identification.estimate.verdict import loudest, weighed_otherwise
+from rig_identification.estimate.verdict import looseness, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding, rival
@@ -176,7 +176,7 @@ def _fitted_whole(
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand
     trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None
     trace = trace and only_a_trace(ideal.fitted, fitted)
-    loose = loudest(fitted) if trace else 1.0
+    loose = looseness(fitted) if trace else 1.0
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = ", ".join(f.effect for f in findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
@@ -255,7 +255,9 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
-    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal)
+    # Far from the noise the cautious fit knows by itself how little it knows
+    loose = looseness(ideal.fitted) if near_noise(ideal.fitted) else 1.0
+    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, loose)
 
 
 def _unknown(ideal: Fitted, here: Problem, evaluation: Evaluation, liar: str | None) -> Finding | None:

@@ -16,7 +16,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.prediction import Bench, linearise_run, smoothed
-from rig_identification.estimate.solve import fit_start
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import start_covariance
 from rig_identification.model.motion import State
 

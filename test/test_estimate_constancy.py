@@ -1,0 +1,62 @@
+"""Held-out runs that ask for other parameters: chance, and what is not chance, against linear theory."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from rig_identification.estimate.constancy import departure, shared_information
+
+PARAMETERS, STARTS, ROWS = 6, 4, 120
+
+
+def linear_world(rng: np.random.Generator, moved: np.ndarray) -> tuple[np.ndarray, SimpleNamespace]:
+    """A fitted linear model's information, and a held-out run of parameters ``moved`` from its truth."""
+    truth = rng.normal(size=PARAMETERS)  # prior N(0, 1)
+    rows = rng.normal(size=(ROWS, PARAMETERS)) * np.logspace(-2.5, 0.5, PARAMETERS)
+    begun = rng.normal(size=(ROWS, STARTS))
+    both = np.concatenate([rows, begun], axis=1)
+    data = rows @ truth + begun @ rng.normal(size=STARTS) + rng.normal(size=ROWS)
+    information = both.T @ both
+    information[:PARAMETERS, :PARAMETERS] += np.eye(PARAMETERS)
+    fitted = np.linalg.solve(information, both.T @ data)[:PARAMETERS]
+    other = rng.normal(size=(ROWS, PARAMETERS)) * np.logspace(-2.5, 0.5, PARAMETERS)
+    starts = rng.normal(size=(ROWS, STARTS))
+    measured = other @ (truth + moved) + starts @ rng.normal(size=STARTS) + rng.normal(size=ROWS)
+    run = SimpleNamespace(
+        jacobian=np.concatenate([other, starts], axis=1), residual=measured - other @ fitted
+    )
+    return shared_information(information, PARAMETERS), run
+
+
+def test_where_the_model_holds_its_chance_is_even() -> None:
+    rng = np.random.default_rng(7)
+    chances = []
+    for _ in range(400):
+        shared, run = linear_world(rng, np.zeros(PARAMETERS))
+        found = departure("run_2", shared, run)
+        assert 0 < found.directions < PARAMETERS, "what the prior alone knows is no comparison"
+        chances.append(10.0**found.log10_p)
+    assert kstest(chances, "uniform").pvalue > 0.01
+
+
+@pytest.mark.parametrize("direction", [PARAMETERS - 1, PARAMETERS - 2])
+def test_parameters_that_moved_are_told(direction: int) -> None:
+    rng = np.random.default_rng(8)
+    moved = np.zeros(PARAMETERS)
+    moved[direction] = 3.0
+    shared, run = linear_world(rng, moved)
+    found = departure("run_2", shared, run)
+    assert found.log10_p < -5.0
+    assert found.excess > 3.0
+
+
+def test_directions_that_the_held_out_run_does_not_see_tell_nothing() -> None:
+    rng = np.random.default_rng(9)
+    moved = np.zeros(PARAMETERS)
+    moved[0] = 30.0  # hardly shows in any row
+    shared, run = linear_world(rng, moved)
+    assert departure("run_2", shared, run).log10_p > -3.0
