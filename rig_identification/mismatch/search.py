@@ -428,11 +428,13 @@ def begun(
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
-    reached = 0.0
+    reached, kept = 0.0, 0.0
+    if not far:
+        # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
+        worthy = sorted(worthy, key=lambda p: (p.candidate.build is not None, -p.gain))
     for promise in worthy:
-        won = max((evaluation.cost - t.evaluation.cost for t in out), default=0.0)
-        if not far and promise.gain < min(CLOSE * won, won - BEATEN):
-            # Near the noise a promise is about what a fit can win
+        if not far and promise.gain < min(CLOSE * kept, kept - BEATEN):
+            # Another hypothesis promised much more, near the noise, and kept it
             continue
         if far and promise.candidate.build is not None and promise.gain < CLOSE * reached:
             # Another hypothesis left nothing already, and much more was expected of it
@@ -444,6 +446,7 @@ def begun(
             trial = finished(trial) or trial
         if trial is not None:
             out.append(trial)
+            kept = max(kept, min(promise.gain, evaluation.cost - trial.evaluation.cost))
             if far and _at_noise(trial):
                 reached = max(reached, promise.gain)
                 if promise is not worthy[0]:
