@@ -1,4 +1,4 @@
-"""A run's own start state, everything else held: how a run is launched, and all that a held-out run is given."""
+"""A run's own start state, everything else held: how a run is launched, and all that a held-out run gets."""
 
 from __future__ import annotations
 

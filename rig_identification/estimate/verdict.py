@@ -121,6 +121,16 @@ def hear(fitted: Fitted) -> Heard:
     return Heard(witnesses, departures)
 
 
+#: Variance, in parts of what both claim, by which a held-out run's parameters may differ and the model still
+#: be called an approximation: three standard deviations, beyond which nothing is ordinary.
+APPROXIMATE = 9.0
+
+
+def contradicted(fitted: Fitted) -> bool:
+    """Whether a held-out run asks for parameters so far off that the model in the fit is none of the rig."""
+    return any(d.excess > APPROXIMATE for d in hear(fitted).contradicting())
+
+
 def looseness(fitted: Fitted) -> float:
     """How many times too much a fit claims to know: 1 where its residuals are noise.
 

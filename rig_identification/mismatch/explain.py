@@ -19,16 +19,18 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
-from rig_identification.estimate.verdict import looseness, weighed_otherwise
+from rig_identification.estimate.verdict import contradicted, looseness, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.push import without_push
 from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import (
+    AT_NOISE,
     CHIEF,
     MOST_EFFECTS,
     Trial,
+    Trials,
     adopted,
     beyond_doubt,
     catalogue,
@@ -134,10 +136,9 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
         search.liar = search.liar or tried.liar
         if not tried.done:
             break
+        before = replace(search, found=list(search.found), rivals=list(search.rivals))
         first = tried.done[0]
-        search.found.append(first)
-        search.rivals += [rival(t, first) for t in tried.done[1:]]
-        search.here, search.evaluation = adopted(search.here, search.evaluation, first)
+        _adopt(search, tried, first)
         if not search.whole:
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         if misfit(search.evaluation) > EXPLAINED:
@@ -153,12 +154,43 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best
+        elif near_noise(best.fitted):
+            again = _second_choice(ideal, before, tried, notify)
+            if again is not None:
+                return _pruned(again[0], again[1], len(candidates))
         if near_noise(best.fitted):
             search.here, search.evaluation = best.fitted.problem, best.fitted.evaluation
         elif misfit(best.fitted.evaluation) > WRONG and first.candidate.build is not None:
             # Short pieces bend to anything that swings; what whole runs refute is no base to go on from
             break
     return fallback or best
+
+
+def _adopt(search: _Search, tried: Trials, chosen: Trial) -> None:
+    """Go on with ``chosen`` in the model; the other likely ones are its rivals."""
+    search.found.append(chosen)
+    search.rivals += [rival(t, chosen) for t in tried.done if t is not chosen]
+    search.here, search.evaluation = adopted(search.here, search.evaluation, chosen)
+
+
+def _second_choice(
+    ideal: Ideal, before: _Search, tried: Trials, notify: Notify
+) -> tuple[Explained, _Search] | None:
+    """A less likely hypothesis that explains all runs where the likeliest does not, and how it was found.
+
+    What has more numbers may bend further to the fitted runs. Held-out runs and the scale, which
+    tell what is bent, are heard by the verdict alone.
+    """
+    for other in (*tried.done[1:], *tried.beaten):
+        search = replace(before, found=list(before.found), rivals=list(before.rivals))
+        _adopt(search, tried, other)
+        if misfit(search.evaluation) > AT_NOISE:
+            continue
+        notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), 0.9)
+        found = _whole(ideal, search)
+        if found.mismatch.verdict == "explained" and not found.trace:
+            return found, search
+    return None
 
 
 def _whole(ideal: Ideal, search: _Search) -> Explained:
@@ -175,7 +207,7 @@ def _fitted_whole(
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand
     trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None
-    trace = trace and only_a_trace(ideal.fitted, fitted)
+    trace = trace and only_a_trace(ideal.fitted, fitted) and not contradicted(fitted)
     loose = looseness(fitted) if trace else 1.0
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = ", ".join(f.effect for f in findings)
@@ -235,7 +267,8 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
         best = _whole(ideal, search)
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
-    if convincing and best is not None and misfit(best.fitted.evaluation) < WRONG:
+    convincing = convincing and best is not None and misfit(best.fitted.evaluation) < WRONG
+    if convincing and best is not None and not contradicted(best.fitted):
         kept: tuple[Finding, ...] = best.mismatch.findings
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:

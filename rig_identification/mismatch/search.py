@@ -338,6 +338,7 @@ class Trials:
 
     done: list[Trial]
     liar: str | None = None
+    beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
 
 
 def trials(
@@ -391,16 +392,16 @@ def trials(
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
     tried.sort(key=lambda t: -t.evidence)
     done: list[Trial] = []
+    beaten: list[Trial] = []
     for trial in tried:
-        if len(done) == FINISHED:
-            break
-        if any(_at_noise(t) for t in done) and _beaten(trial, done, tried[0], far):
+        last = any(_at_noise(t) for t in done) and _beaten(trial, done, tried[0], far)
+        if len(done) == FINISHED or (last and not trial.settled):
             continue
         notify(trial.candidate.label)
         ended = finished(trial)
         if ended is not None and ended.evidence > needed and beyond_doubt(ended, ordinary, limit):
-            done.append(ended)
-    return Trials(told_apart(done, MEANT), device)
+            (beaten if last else done).append(ended)
+    return Trials(told_apart(done, MEANT), device, tuple(beaten))
 
 
 def _worthy(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
