@@ -96,11 +96,11 @@ HORIZONS = (0.4, 1.2)
 #: Std of its prior that a fit starts away from at most, and parts of the largest compliance of a ceiling that
 #: are tried where the probe says nothing.
 FARTHEST = 3.0
-SINKS = (0.03, 0.1, 0.3, 0.7)
+SINKS = (0.03, 0.7)
 #: Multiples of the usual stiffness of cables that are tried first: thin wire to thick rope.
-STRETCHES = (0.1, 0.3, 1.0, 3.0, 10.0)
-#: Factor between two of them.
-SPACED = 3.0
+STRETCHES = (0.1, 10.0)
+#: Factor between two amounts, and where little is left.
+SPACED, FINELY = 3.2, 1.4
 
 
 @dataclass(frozen=True)
@@ -459,7 +459,8 @@ def begun(
 class Amount:
     """How much of what a change of the model's amount explains, by trying it instead of to first order.
 
-    Where much is left it is tried over the second of HORIZONS, and what that tells is told of all.
+    It is tried over the second of HORIZONS: what rings is soon out of step everywhere else. Where much is
+    left what that tells is told of all; near the noise it tells no more than it sees.
     """
 
     problem: Problem
@@ -475,7 +476,7 @@ class Amount:
     @cached_property
     def part(self) -> Problem:
         """What amounts are tried on."""
-        return shortened(self.problem, HORIZONS[-1]) if self.far else self.problem
+        return shortened(self.problem, HORIZONS[-1])
 
     @cached_property
     def before(self) -> Evaluation | None:
@@ -503,12 +504,12 @@ class Amount:
         at = int(np.argmax(gains))
         return self._promise(amounts[at], gains[at])
 
-    def refined(self, promise: Promise) -> Promise:
-        """The promise with the best amount within a factor of SPACED of its own."""
+    def refined(self, promise: Promise, spaced: float) -> Promise:
+        """The promise with the best amount within a factor of ``spaced`` of its own."""
         amount = promise.values[self.name]
         found = minimize_scalar(
             lambda x: -self.gain(amount * float(np.exp(x))),
-            bounds=(-np.log(SPACED), np.log(SPACED)),
+            bounds=(-np.log(spaced), np.log(spaced)),
             method="bounded",
             options={"xatol": 0.1},
         )
@@ -530,13 +531,21 @@ def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Prom
     for axis, a in enumerate(AXES):
         ceiling = ceiling_candidate(rig, model, mass, axis)
         tried.append(Amount(problem, evaluation, ceiling, f"ceiling.compliance.{a}"))
-    stretches = [usual_stiffness(rig, mass) * factor for factor in STRETCHES]
-    sinks = [largest_compliance(rig, mass) * factor for factor in SINKS]
-    out = [amount.best(sinks if k else stretches) for k, amount in enumerate(tried)]
+    # Near the noise little of it is seen: an amount that is not nearly right explains none of that
+    spaced = SPACED if misfit(evaluation) > NEAR_SQUARE else FINELY
+    stretches = usual_stiffness(rig, mass) * _spread(STRETCHES, spaced)
+    sinks = largest_compliance(rig, mass) * _spread(SINKS, spaced)
+    out = [amount.best(list(sinks if k else stretches)) for k, amount in enumerate(tried)]
     first = int(np.argmax([promise.gain for promise in out]))
     if out[first].gain > 0.0:
-        out[first] = tried[first].refined(out[first])
+        out[first] = tried[first].refined(out[first], spaced)
     return out
+
+
+def _spread(ends: tuple[float, float], spaced: float) -> Array:
+    """Amounts from end to end, at most a factor of ``spaced`` apart."""
+    count = int(np.ceil(np.log(ends[1] / ends[0]) / np.log(spaced))) + 1
+    return np.asarray(np.geomspace(*ends, count))
 
 
 def far_promises(
