@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.estimate.force_gaps import bridged
+from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.sampling import (
     Grid,
     NodeInput,
@@ -16,7 +18,6 @@ from rig_identification.estimate.sampling import (
     cubic_error,
     group_by_node,
     node_input,
-    sample_noise_std,
 )
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
@@ -36,6 +37,8 @@ FOLLOWED = 0.1
 WATCHED_NODE_STEP = 0.025
 #: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).
 MARGIN = 0.02
+#: Between two gaps of the force a shorter part (s) tells hardly more than its own start state.
+SHORTEST_PART = 1.0
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,7 @@ class Run:
     exciter_rate: float  # Hz
     R_tracker_mean: Array | None = None  # (3, 3) see sensors.mocap
     offset: float = 0.0  # s after the recording's start at which node 0 lies
+    unknown: tuple[tuple[float, float], ...] = ()  # stretches (s) whose force is not known (force_gaps.py)
 
     @cached_property
     def samplers(self) -> tuple[Sampler, ...]:
@@ -121,15 +125,20 @@ class Run:
             cut.append(replace(channel, time=time[inside], values=values, group=group, node=node))
         # The input is cut, not made anew: at an edge a spline knows half as much
         force = None if self.force is None else self.force.between(first, last)
-        return replace(self, grid=grid, channels=tuple(cut), force=force, offset=self.offset + shift)
+        offset = self.offset + shift
+        return replace(self, grid=grid, channels=tuple(cut), force=force, offset=offset, unknown=())
 
-
-def noise_std(rig: Rig, name: str, time: Array, values: Array) -> tuple[Array, bool]:
-    """(std of one sample (w,), whether it was estimated): described, or read off the samples themselves."""
-    width = values.shape[1]
-    if name in rig.noise:
-        return np.full(width, rig.noise[name]), False
-    return np.maximum(sample_noise_std(time, values), 1e-9), True
+    def where_driven(self) -> tuple[Run, ...]:
+        """The run's parts between stretches in which its force is not known."""
+        if not self.unknown:
+            return (self,)
+        edges = [0.0, *(edge for stretch in self.unknown for edge in stretch), self.grid.duration]
+        parts = []
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            first, last = int(np.ceil(start / self.grid.step)), int(end / self.grid.step)
+            if (last - first) * self.grid.step > SHORTEST_PART:
+                parts.append(self.between(first, last, margin=MARGIN))
+        return tuple(parts)
 
 
 def _channel(
@@ -204,9 +213,13 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
         )
     exciter = recording.exciter_force if rig.exciter is not None else None
     noise, rate, force = 0.0, 1.0, None
+    unknown: tuple[tuple[float, float], ...] = ()
     if exciter is not None and exciter.time.size > 8:
         std, _ = noise_std(rig, "exciter_force", exciter.time, exciter.values)
         noise = float(np.sqrt(np.mean(std**2)))
         rate = 1.0 / float(np.median(np.diff(exciter.time)))
-        force = node_input(grid, exciter.time, exciter.values, noise)
-    return Run(recording, grid, tuple(c for c in found if c is not None), force, noise, rate, mean)
+        known = bridged(grid, exciter.time, exciter.values, noise)
+        force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
+        unknown = known.unknown
+    channels = tuple(c for c in found if c is not None)
+    return Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)

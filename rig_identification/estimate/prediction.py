@@ -141,14 +141,15 @@ def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:
 def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     """(N, 6, 6) covariance of the wrench held over each node interval that the force's error stands for.
 
-    Two errors: the samples' noise, and the moment of a jump, which lies anywhere between two nodes.
+    Three errors: the samples' noise, the moment of a jump, which lies anywhere between two nodes, and what
+    the force did where it was not sampled.
     """
     out = np.zeros((run.grid.nodes, 6, 6))
-    if run.force is None or run.exciter_noise == 0.0:
+    if run.force is None or (run.exciter_noise == 0.0 and not np.any(run.force.doubt)):
         return out
     spread = exciter_wrench_map(parameters, theta)
     held = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
-    out[:] = held * spread @ spread.T
+    out[:] = (held + run.force.doubt)[:, None, None] * (spread @ spread.T)
     jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12
     return np.asarray(out + jumps @ jumps.transpose(0, 2, 1) / 12.0)

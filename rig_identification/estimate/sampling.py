@@ -160,11 +160,12 @@ class NodeInput:
     middle: Array  # (nodes, w) midway to the next node, beyond the mean of both
     rate: Array  # (nodes, w) per s, smoothed
     jumps: Array  # (nodes, w) see jumps_of
+    doubt: Array  # (nodes,) variance of each component over an interval that was not sampled
 
     def between(self, first: int, last: int) -> NodeInput:
         """The input at nodes ``first`` to ``last``."""
         cut = slice(first, last + 1)
-        return NodeInput(self.values[cut], self.middle[cut], self.rate[cut], self.jumps[cut])
+        return NodeInput(self.values[cut], self.middle[cut], self.rate[cut], self.jumps[cut], self.doubt[cut])
 
 
 def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInput:
@@ -179,7 +180,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     jumps = jumps_of(line, noise)
     rate = rate_of_change(grid, line)
     if grid.nodes < 5:
-        return NodeInput(line, np.zeros_like(line), rate, jumps)
+        return NodeInput(line, np.zeros_like(line), rate, jumps, np.zeros(grid.nodes))
     rough = np.any(jumps != 0.0, axis=1)[:, None]
     rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
     curved = np.zeros_like(line)
@@ -191,7 +192,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     smooth = np.where(rough, line, line - over * curved)
     middle = np.zeros_like(line)
     middle[1:-2] = (smooth[1:-2] + smooth[2:-1] - smooth[:-3] - smooth[3:]) / 16.0
-    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, jumps)
+    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, jumps, np.zeros(grid.nodes))
 
 
 def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
