@@ -30,6 +30,9 @@ Index = NDArray[np.int64]
 NODE_STEP = 0.005
 WIDE_NODE_STEP = 0.01
 LONG_RUN = 150.0
+#: Where the force is sampled more seldom than this, in wide node steps, nodes lie as far apart as its
+#: samples: the error of a sample lasts until the next one, and is white only from node to node.
+SELDOM = 1.5
 #: Root mean square error of that cubic, in units of one sample's noise, up to which it follows.
 FOLLOWED = 0.1
 #: Node spacing where a run is only watched: no device follows more than the swing itself, whose pose a
@@ -166,22 +169,36 @@ def node_step(rig: Rig, recording: Recording) -> float:
     fast = (recording.imu, recording.exciter_force, recording.inclination)
     if not recording.tension and all(series is None for series in fast):
         return WATCHED_NODE_STEP
-    if recording.duration > LONG_RUN:
+    held = _force_step(rig, recording)
+    if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
+        return held
+    if recording.duration > LONG_RUN or _all_follow(rig, recording, WIDE_NODE_STEP):
         return WIDE_NODE_STEP
-    follows = [_follows(rig, "tension", series) for series in recording.tension.values()]
+    return NODE_STEP
+
+
+def _force_step(rig: Rig, recording: Recording) -> float:
+    """Median time (s) between two samples of the exciter's force; 0 where it is not used."""
+    force = recording.exciter_force if rig.exciter is not None else None
+    return 0.0 if force is None or force.time.size < 16 else float(np.median(np.diff(force.time)))
+
+
+def _all_follow(rig: Rig, recording: Recording, step: float) -> bool:
+    """Whether a cubic through nodes ``step`` apart follows tensions, rates and specific forces."""
+    follows = [_follows(rig, "tension", series, step) for series in recording.tension.values()]
     if recording.imu is not None:
         time, values = recording.imu.time, recording.imu.values
-        follows.append(_follows(rig, "angular_rate", Series(time, values[:, :3])))
-        follows.append(_follows(rig, "specific_force", Series(time, values[:, 3:])))
-    return WIDE_NODE_STEP if all(follows) else NODE_STEP
+        follows.append(_follows(rig, "angular_rate", Series(time, values[:, :3]), step))
+        follows.append(_follows(rig, "specific_force", Series(time, values[:, 3:]), step))
+    return all(follows)
 
 
-def _follows(rig: Rig, name: str, series: Series) -> bool:
-    """Whether a cubic through nodes WIDE_NODE_STEP apart follows samples to a part of their noise."""
+def _follows(rig: Rig, name: str, series: Series, step: float) -> bool:
+    """Whether a cubic through nodes ``step`` apart follows samples to a part of their noise."""
     if series.time.size < 16:
         return True
     noise, _ = noise_std(rig, name, series.time, series.values)
-    return bool(np.all(cubic_error(series.time, series.values, noise, WIDE_NODE_STEP) < FOLLOWED * noise))
+    return bool(np.all(cubic_error(series.time, series.values, noise, step) < FOLLOWED * noise))
 
 
 def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:

@@ -167,7 +167,52 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
     """Fit the ideal model to a session and predict its held-out runs."""
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
-    return fit_from(start_of(problem, theta, held, progress), progress)
+    fitted = fit_from(start_of(problem, theta, held, progress), progress)
+    less = without_unseen_force(session, fitted, lambda run: run.recording.exciter_unmeasured)
+    if less is None:
+        return fitted
+    progress("without the runs whose force was not measured", 0.6)
+    problem, theta, held = pose_problem(less.session, assumed)
+    again = fit_from(start_of(problem, theta, held, progress), progress)
+    return replace(again, notes=(*again.notes, less.note))
+
+
+@dataclass(frozen=True)
+class Less:
+    """A session without some of its runs, and what is told of them."""
+
+    session: Session
+    note: str
+
+
+def without_unseen_force(session: Session, fitted: Fitted, chosen: Callable[[Run], bool]) -> Less | None:
+    """The session less its ``chosen`` runs without the force of a described exciter, where it moves them.
+
+    None where there are none, where a free swing explains them, or where nothing would be left.
+    """
+    if session.rig.exciter is None:
+        return None
+    runs = (*fitted.problem.runs, *fitted.holdout_runs)
+    seen = (*fitted.evaluation.runs, *fitted.holdouts)
+    pairs = [(run, lin) for run, lin in zip(runs, seen, strict=True) if run.force is None and chosen(run)]
+    if not any(np.mean(linearised.residual**2) > HOPELESS_SQUARE for _, linearised in pairs):
+        return None
+    # One that is driven bends the fit of all: no other without its force is to be trusted either
+    names = [
+        r.name for r in (*session.training, *session.holdouts) if any(run.recording is r for run, _ in pairs)
+    ]
+    kept = tuple(r for r in session.recordings if r.name not in names)
+    if all(r.kind == "dynamic" and r.holdout for r in kept):
+        return None
+    return Less(replace(session, recordings=kept), UNSEEN_FORCE.format(runs=" and ".join(names)))
+
+
+#: What is told of runs without the force that drives them.
+UNSEEN_FORCE = (
+    "{runs}: left aside. The exciter's force was not recorded, and without it the model does not move as the "
+    "body did: something drives it, and what an unknown force does tells nothing of the inertia. Record the "
+    "exciter's force, or let the body swing with the exciter off."
+)
 
 
 def fit_from(start: Start, progress: Progress = _silent) -> Fitted:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,6 +214,12 @@ def longest_step(run: Run) -> float:
     return max(FIT_STEP, run.grid.step)
 
 
+def _no_rows(states: int, columns: int) -> tuple[NDArray[Any], ...]:
+    """What a run without a sample stacks."""
+    none = np.zeros(0, dtype=np.int64)
+    return none, none, none, np.zeros((0, states)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, columns))
+
+
 def linearise_run(
     bench: Bench,
     run: Run,
@@ -287,6 +294,9 @@ def linearise_run(
                 columns.reshape(rows, -1),
             )
         )
+    if not stacked:
+        # A stretch in which nothing was measured moves as the model does
+        stacked.append(_no_rows(motion.states.shape[1], 1 + known + starts))
     at, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
     order = np.argsort(at, kind="stable")
     at, which, axis, H, D, variance, columns = (

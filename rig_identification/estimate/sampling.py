@@ -226,6 +226,8 @@ def cubic_error(time: Array, values: Array, noise: Array, step: float) -> Array:
     return np.asarray(np.sqrt(np.sum(signal * share[:, None] ** 2, axis=0)))
 
 
+#: Part of an interval by which one may differ from the others before samples count as uneven.
+UNEVEN = 0.2
 #: Stretch over which motion is a cubic to well below any sensor's noise, s.
 LOCAL = 0.06
 
@@ -239,7 +241,25 @@ def sample_noise_std(time: Array, values: Array, local: float = LOCAL) -> Array:
     window = max(7, 2 * int(0.5 * local * rate) + 1)
     if time.size < 2 * window:
         return np.asarray(np.std(values, axis=0) + 1e-12)
+    steps = np.diff(time)
+    if np.mean(np.abs(steps - np.median(steps)) > UNEVEN * np.median(steps)) > 1.0 / window:
+        return _uneven_noise_std(time, values, window)
     rest = values - savgol_filter(values, window, 3, axis=0)
     # A smoother with hat matrix H leaves (1 - H_ii) of white noise's variance, H being a projection there
     kept = 1.0 - savgol_coeffs(window, 3)[window // 2]
     return np.asarray(np.std(rest, axis=0) / np.sqrt(kept))
+
+
+def _uneven_noise_std(time: Array, values: Array, window: int) -> Array:
+    """The same of samples that are not equidistant: what cubics through ``window`` of them each leave."""
+    count = time.size // window
+    at = time[: count * window].reshape(count, window)
+    at = at - np.mean(at, axis=1, keepdims=True)
+    reach = np.max(np.abs(at), axis=1)
+    # A gap inside makes the stretch too long for a cubic
+    chosen = reach < 2.0 * np.median(reach)
+    powers = (at[chosen] / reach[chosen, None])[:, :, None] ** np.arange(4)
+    blocks = values[: count * window].reshape(count, window, -1)[chosen]
+    basis = np.linalg.qr(powers)[0]
+    rest = blocks - basis @ (np.swapaxes(basis, 1, 2) @ blocks)
+    return np.asarray(np.sqrt(np.sum(rest**2, axis=(0, 1)) / (rest.shape[0] * (window - 4))))
