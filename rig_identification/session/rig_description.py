@@ -57,7 +57,7 @@ def rig_from_fields(top: Fields) -> Rig:
         imu=_mount(top, "imu"),
         inclinometer=_mount(top, "inclinometer", with_position=False),
         exciter=_mount(top, "exciter"),
-        mocap=_mount(top, "mocap"),
+        mocap=_marker_mount(top),
         noise=_noise(top),
         tolerance=_tolerance(top),
     )
@@ -185,6 +185,16 @@ def _mount(top: Fields, name: str, *, with_position: bool = True) -> Mount | Non
     else:
         position = np.zeros(3)
     return Mount(position, fields.quaternion("orientation"))
+
+
+def _marker_mount(top: Fields) -> Mount | None:
+    """Motion capture's mount; half of one is taken as not given, since all that is not given is estimated."""
+    if not top.has("mocap"):
+        return None
+    fields = top.section("mocap", "position and orientation")
+    fields.refuse_misspelt(("position", "orientation"))
+    whole = fields.has("position") and fields.has("orientation")
+    return _mount(top, "mocap") if whole else None
 
 
 def _noise(top: Fields) -> dict[str, float]:
