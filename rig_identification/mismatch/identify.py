@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig_identification.estimate.determinate import determinate
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import (
     Assumed,
@@ -52,7 +51,6 @@ def identify(
 
     origins = near_origins(session.rig)
     session = session if origins.given else moved(session, origins)
-    session, spare = determinate(session)
     found, ideal = _identified(session, notify, assumed)
     less = None
     if found.mismatch.verdict == "unexplained" and all(
@@ -63,8 +61,6 @@ def identify(
     if less is not None:
         rest, _ = _identified(less.session, notify, assumed)
         found = _without_unseen(found, rest, less.note)
-    if spare is not None:
-        found = replace(found, notes=(*found.notes, spare))
     return found if origins.given else told(found, origins)
 
 
