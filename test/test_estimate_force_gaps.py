@@ -115,3 +115,17 @@ def test_a_gap_in_the_force_leaves_a_session_explained(
     z = (total.values - truth) / np.sqrt(np.diag(total.covariance))
     seen = [i for i, name in enumerate(ELEMENTS) if name not in total.unobservable]
     assert np.max(np.abs(z[seen])) < 3.5
+
+
+def test_a_run_whose_force_was_not_measured_tells_no_inertia(driven: tuple[Session, np.ndarray]) -> None:
+    session, _ = driven
+
+    def unmeasured(r: Recording) -> Recording:
+        return replace(r, exciter_force=None, exciter_unmeasured=True)
+
+    blind = fit_session(replace(session, recordings=tuple(unmeasured(r) for r in session.recordings)))
+    assert judged(blind)[1].verdict == "none"
+    assert any("run_1: left aside" in note for note in blind.notes)
+    total = inertial_estimate(blind.problem, blind.evaluation)
+    assert {"Jxx", "Jyy", "Jzz"} <= set(total.unobservable)
+    assert not {"m", "cx", "cy"} & set(total.unobservable)
