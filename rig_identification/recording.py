@@ -64,6 +64,7 @@ class Recording:
     dummy: Dummy | None = None
     tension: dict[str, Series] = field(default_factory=dict)  # cable name -> (n, 1) N, positive pulls
     exciter_force: Series | None = None  # (n, 3) N, exciter frame, on the body
+    exciter_unmeasured: bool = False  # its topic is there and never holds a number (contract: not measured)
     exciter_shaft: Series | None = None  # (n, 2) angle rad, rate rad/s
     imu: Series | None = None  # (n, 6) angular rate rad/s, specific force m/s^2, imu frame
     inclination: Series | None = None  # (n, 2) rad, x and y axis above the horizontal plane

@@ -207,6 +207,37 @@ def test_a_session_that_is_not_there(tmp_path: Path) -> None:
     assert "session description does not exist" in refusal(lambda: read_session(tmp_path))
 
 
+def test_a_room_surveyed_from_afar_is_read(folder: Path) -> None:
+    def afar(document: Any) -> None:
+        for cable in CABLES:
+            point = document["/**"]["ros__parameters"][cable]["ceiling_point"]
+            point[0] += 2500.0
+
+    edit_yaml(folder / "rig.yaml", afar)
+    assert read_session(folder).rig.cables[0].ceiling_point[0] > 2400.0
+
+
+def test_ceiling_points_in_millimetres(folder: Path) -> None:
+    def in_mm(document: Any) -> None:
+        for cable in CABLES:
+            part = document["/**"]["ros__parameters"][cable]
+            part["ceiling_point"] = [1000.0 * x for x in part["ceiling_point"]]
+
+    edit_yaml(folder / "rig.yaml", in_mm)
+    with pytest.raises(
+        InputError,
+        match=r"ceiling_point\[0\]: 2400 m is 2400 m from that of cable_1, beyond 100 m; is it in mm",
+    ):
+        read_session(folder)
+
+
+def test_half_a_mount_of_motion_capture_is_estimated(folder: Path) -> None:
+    edit_yaml(
+        folder / "rig.yaml", lambda document: document["/**"]["ros__parameters"]["mocap"].pop("position")
+    )
+    assert read_session(folder).rig.mocap is None
+
+
 def test_another_node_name_and_small_numbers_are_read(folder: Path) -> None:
     file = folder / "rig.yaml"
     text = file.read_text().replace("/**:", "/rig/identification:").replace("clock: 0.0005", "clock: 5e-4")

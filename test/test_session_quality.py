@@ -217,6 +217,7 @@ def test_channels_that_measure_nothing(tmp_path: Path) -> None:
 
     written, read = read_edited(tmp_path, edit)
     assert read.exciter_force is None
+    assert read.exciter_unmeasured
     assert sorted(read.tension) == ["cable_2", "cable_3"]
     for topic in (CABLE, "/rig/exciter/wrench"):
         assert account(read, topic).used == 0

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.estimate.force_gaps import bridged
+from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.sampling import (
     Grid,
     NodeInput,
@@ -16,7 +18,6 @@ from rig_identification.estimate.sampling import (
     cubic_error,
     group_by_node,
     node_input,
-    sample_noise_std,
 )
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
@@ -29,6 +30,9 @@ Index = NDArray[np.int64]
 NODE_STEP = 0.005
 WIDE_NODE_STEP = 0.01
 LONG_RUN = 150.0
+#: Where the force is sampled more seldom than this, in wide node steps, nodes lie as far apart as its
+#: samples: the error of a sample lasts until the next one, and is white only from node to node.
+SELDOM = 1.5
 #: Root mean square error of that cubic, in units of one sample's noise, up to which it follows.
 FOLLOWED = 0.1
 #: Node spacing where a run is only watched: no device follows more than the swing itself, whose pose a
@@ -36,6 +40,8 @@ FOLLOWED = 0.1
 WATCHED_NODE_STEP = 0.025
 #: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).
 MARGIN = 0.02
+#: Between two gaps of the force a shorter part (s) tells hardly more than its own start state.
+SHORTEST_PART = 1.0
 
 
 @dataclass(frozen=True)
@@ -94,6 +100,7 @@ class Run:
     exciter_rate: float  # Hz
     R_tracker_mean: Array | None = None  # (3, 3) see sensors.mocap
     offset: float = 0.0  # s after the recording's start at which node 0 lies
+    unknown: tuple[tuple[float, float], ...] = ()  # stretches (s) whose force is not known (force_gaps.py)
 
     @cached_property
     def samplers(self) -> tuple[Sampler, ...]:
@@ -121,15 +128,20 @@ class Run:
             cut.append(replace(channel, time=time[inside], values=values, group=group, node=node))
         # The input is cut, not made anew: at an edge a spline knows half as much
         force = None if self.force is None else self.force.between(first, last)
-        return replace(self, grid=grid, channels=tuple(cut), force=force, offset=self.offset + shift)
+        offset = self.offset + shift
+        return replace(self, grid=grid, channels=tuple(cut), force=force, offset=offset, unknown=())
 
-
-def noise_std(rig: Rig, name: str, time: Array, values: Array) -> tuple[Array, bool]:
-    """(std of one sample (w,), whether it was estimated): described, or read off the samples themselves."""
-    width = values.shape[1]
-    if name in rig.noise:
-        return np.full(width, rig.noise[name]), False
-    return np.maximum(sample_noise_std(time, values), 1e-9), True
+    def where_driven(self) -> tuple[Run, ...]:
+        """The run's parts between stretches in which its force is not known."""
+        if not self.unknown:
+            return (self,)
+        edges = [0.0, *(edge for stretch in self.unknown for edge in stretch), self.grid.duration]
+        parts = []
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            first, last = int(np.ceil(start / self.grid.step)), int(end / self.grid.step)
+            if (last - first) * self.grid.step > SHORTEST_PART:
+                parts.append(self.between(first, last, margin=MARGIN))
+        return tuple(parts)
 
 
 def _channel(
@@ -157,22 +169,36 @@ def node_step(rig: Rig, recording: Recording) -> float:
     fast = (recording.imu, recording.exciter_force, recording.inclination)
     if not recording.tension and all(series is None for series in fast):
         return WATCHED_NODE_STEP
-    if recording.duration > LONG_RUN:
+    held = _force_step(rig, recording)
+    if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
+        return held
+    if recording.duration > LONG_RUN or _all_follow(rig, recording, WIDE_NODE_STEP):
         return WIDE_NODE_STEP
-    follows = [_follows(rig, "tension", series) for series in recording.tension.values()]
+    return NODE_STEP
+
+
+def _force_step(rig: Rig, recording: Recording) -> float:
+    """Median time (s) between two samples of the exciter's force; 0 where it is not used."""
+    force = recording.exciter_force if rig.exciter is not None else None
+    return 0.0 if force is None or force.time.size < 16 else float(np.median(np.diff(force.time)))
+
+
+def _all_follow(rig: Rig, recording: Recording, step: float) -> bool:
+    """Whether a cubic through nodes ``step`` apart follows tensions, rates and specific forces."""
+    follows = [_follows(rig, "tension", series, step) for series in recording.tension.values()]
     if recording.imu is not None:
         time, values = recording.imu.time, recording.imu.values
-        follows.append(_follows(rig, "angular_rate", Series(time, values[:, :3])))
-        follows.append(_follows(rig, "specific_force", Series(time, values[:, 3:])))
-    return WIDE_NODE_STEP if all(follows) else NODE_STEP
+        follows.append(_follows(rig, "angular_rate", Series(time, values[:, :3]), step))
+        follows.append(_follows(rig, "specific_force", Series(time, values[:, 3:]), step))
+    return all(follows)
 
 
-def _follows(rig: Rig, name: str, series: Series) -> bool:
-    """Whether a cubic through nodes WIDE_NODE_STEP apart follows samples to a part of their noise."""
+def _follows(rig: Rig, name: str, series: Series, step: float) -> bool:
+    """Whether a cubic through nodes ``step`` apart follows samples to a part of their noise."""
     if series.time.size < 16:
         return True
     noise, _ = noise_std(rig, name, series.time, series.values)
-    return bool(np.all(cubic_error(series.time, series.values, noise, WIDE_NODE_STEP) < FOLLOWED * noise))
+    return bool(np.all(cubic_error(series.time, series.values, noise, step) < FOLLOWED * noise))
 
 
 def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
@@ -204,9 +230,13 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
         )
     exciter = recording.exciter_force if rig.exciter is not None else None
     noise, rate, force = 0.0, 1.0, None
+    unknown: tuple[tuple[float, float], ...] = ()
     if exciter is not None and exciter.time.size > 8:
         std, _ = noise_std(rig, "exciter_force", exciter.time, exciter.values)
         noise = float(np.sqrt(np.mean(std**2)))
         rate = 1.0 / float(np.median(np.diff(exciter.time)))
-        force = node_input(grid, exciter.time, exciter.values, noise)
-    return Run(recording, grid, tuple(c for c in found if c is not None), force, noise, rate, mean)
+        known = bridged(grid, exciter.time, exciter.values, noise)
+        force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
+        unknown = known.unknown
+    channels = tuple(c for c in found if c is not None)
+    return Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)

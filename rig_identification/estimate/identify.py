@@ -12,10 +12,10 @@ from rig_identification.errors import InputError
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, prepare
-from rig_identification.estimate.first_guess import first_elements, weak_prior
+from rig_identification.estimate.first_guess import first_elements, mocap_mount, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
-from rig_identification.estimate.launch import Launch, launch_state
+from rig_identification.estimate.launch import REGRESSED, Launch, launch_state, tracked
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
@@ -30,9 +30,11 @@ from rig_identification.estimate.segments import (
 )
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.verdict import judge
+from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import RigModel, State, rig_model
+from rig_identification.model.sensors import MocapMount
 from rig_identification.recording import Session
 from rig_identification.result import ChannelFit, Identification, Mismatch, ParameterEstimate
 
@@ -60,8 +62,8 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     elements = first_elements(session)
     model = rig_model(rig, elements)
     model = model if assumed is None else assumed(model)
-    runs = tuple(prepare(rig, recording) for recording in session.training)
-    held = tuple(prepare(rig, recording) for recording in session.holdouts)
+    runs = tuple(part for r in session.training for part in prepare(rig, r).where_driven())
+    held = tuple(part for r in session.holdouts for part in prepare(rig, r).where_driven())
     rests = tuple(prepare_rest(rig, recording) for recording in session.statics)
     channels = {c.device for run in (*runs, *held) for c in run.channels}
     channels |= {c.device for evidence in rests for c in evidence.channels}
@@ -97,12 +99,27 @@ class Start:
 
 def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
     """From rest, then from momentum: sessions whose tensions or IMU are recorded."""
-    launch = Launch(problem, theta).from_rest()
-    progress("first guess from momentum", 0.05)
-    launch = launch.from_momentum()
+    blind = replace(problem, runs=tuple(without_mocap(run) for run in problem.runs))
+    launch = Launch(blind, theta).from_rest()
     if launch.rest is None:
         raise AssertionError("from_rest finds a pose")
-    return Start(problem, launch.point(), launch.rest, held)
+    progress("first guess from momentum", 0.05)
+    watched = next((run for run in problem.runs if run.R_tracker_mean is not None), None)
+    if watched is None:
+        return Start(problem, launch.from_momentum().point(), launch.rest, held)
+    if problem.bench.rig.mocap is not None:
+        mount: MocapMount | None = mocap_mount(problem.bench.rig, watched, launch.rest, 0.0)
+    elif any(c.device == "imu" for c in watched.channels):
+        track = tracked(blind.bench, without_mocap(watched).until(REGRESSED), launch.theta, launch.rest)
+        mount = None if track is None else mount_from_track(watched, track)
+    else:
+        found = scan(problem, watched)
+        mount = None if found is None else found.problem.bench.mocap
+    if mount is None:
+        mount = mocap_mount(problem.bench.rig, watched, launch.rest, 0.0)
+    problem = replace(problem, bench=replace(problem.bench, mocap=mount))
+    launch = replace(launch, problem=problem).from_momentum()
+    return Start(problem, launch.point(), launch.rest or launch.starts[0], held)
 
 
 def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) -> Start | None:
@@ -167,7 +184,66 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
     """Fit the ideal model to a session and predict its held-out runs."""
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
-    return fit_from(start_of(problem, theta, held, progress), progress)
+    fitted = fit_from(start_of(problem, theta, held, progress), progress)
+    less = without_unseen_force(session, fitted, _surely_driven)
+    if less is None:
+        return fitted
+    progress("without the runs whose force was not measured", 0.6)
+    problem, theta, held = pose_problem(less.session, assumed)
+    again = fit_from(start_of(problem, theta, held, progress), progress)
+    return replace(again, notes=(*again.notes, less.note))
+
+
+#: rad/s, of an exciter's shaft that turns.
+TURNS = 0.5
+
+
+def _surely_driven(run: Run) -> bool:
+    """Whether an exciter ran whose force was not measured: its topic holds no number, or its shaft turns.
+
+    A topic that is missing altogether may mean that there was nothing to measure.
+    """
+    shaft = run.recording.exciter_shaft
+    turning = shaft is not None and float(np.median(np.abs(shaft.values[:, 1]))) > TURNS
+    return run.recording.exciter_unmeasured or turning
+
+
+@dataclass(frozen=True)
+class Less:
+    """A session without some of its runs, and what is told of them."""
+
+    session: Session
+    note: str
+
+
+def without_unseen_force(session: Session, fitted: Fitted, chosen: Callable[[Run], bool]) -> Less | None:
+    """The session less its ``chosen`` runs without the force of a described exciter, where it moves them.
+
+    None where there are none, where a free swing explains them, or where nothing would be left.
+    """
+    if session.rig.exciter is None:
+        return None
+    runs = (*fitted.problem.runs, *fitted.holdout_runs)
+    seen = (*fitted.evaluation.runs, *fitted.holdouts)
+    pairs = [(run, lin) for run, lin in zip(runs, seen, strict=True) if run.force is None and chosen(run)]
+    if not any(np.mean(linearised.residual**2) > HOPELESS_SQUARE for _, linearised in pairs):
+        return None
+    # One that is driven bends the fit of all: no other without its force is to be trusted either
+    names = [
+        r.name for r in (*session.training, *session.holdouts) if any(run.recording is r for run, _ in pairs)
+    ]
+    kept = tuple(r for r in session.recordings if r.name not in names)
+    if all(r.kind == "dynamic" and r.holdout for r in kept):
+        return None
+    return Less(replace(session, recordings=kept), UNSEEN_FORCE.format(runs=" and ".join(names)))
+
+
+#: What is told of runs without the force that drives them.
+UNSEEN_FORCE = (
+    "{runs}: left aside. The exciter's force was not recorded, and without it the model does not move as the "
+    "body did: something drives it, and what an unknown force does tells nothing of the inertia. Record the "
+    "exciter's force, or let the body swing with the exciter off."
+)
 
 
 def fit_from(start: Start, progress: Progress = _silent) -> Fitted:

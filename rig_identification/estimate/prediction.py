@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,14 +142,15 @@ def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:
 def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     """(N, 6, 6) covariance of the wrench held over each node interval that the force's error stands for.
 
-    Two errors: the samples' noise, and the moment of a jump, which lies anywhere between two nodes.
+    Three errors: the samples' noise, the moment of a jump, which lies anywhere between two nodes, and what
+    the force did where it was not sampled.
     """
     out = np.zeros((run.grid.nodes, 6, 6))
-    if run.force is None or run.exciter_noise == 0.0:
+    if run.force is None or (run.exciter_noise == 0.0 and not np.any(run.force.doubt)):
         return out
     spread = exciter_wrench_map(parameters, theta)
     held = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
-    out[:] = held * spread @ spread.T
+    out[:] = (held + run.force.doubt)[:, None, None] * (spread @ spread.T)
     jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12
     return np.asarray(out + jumps @ jumps.transpose(0, 2, 1) / 12.0)
@@ -210,6 +212,12 @@ def longest_step(run: Run) -> float:
     1.3 Hz with 0.01 s, 3e-5 at 1.5 Hz with the 0.025 s of a run that is only watched.
     """
     return max(FIT_STEP, run.grid.step)
+
+
+def _no_rows(states: int, columns: int) -> tuple[NDArray[Any], ...]:
+    """What a run without a sample stacks."""
+    none = np.zeros(0, dtype=np.int64)
+    return none, none, none, np.zeros((0, states)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, columns))
 
 
 def linearise_run(
@@ -286,6 +294,9 @@ def linearise_run(
                 columns.reshape(rows, -1),
             )
         )
+    if not stacked:
+        # A stretch in which nothing was measured moves as the model does
+        stacked.append(_no_rows(motion.states.shape[1], 1 + known + starts))
     at, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
     order = np.argsort(at, kind="stable")
     at, which, axis, H, D, variance, columns = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import noise_std
+from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.prediction import Bench, device_start, read_device
 from rig_identification.model import layout
 from rig_identification.model.body import point_inertia, six_elements

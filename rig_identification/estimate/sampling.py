@@ -160,11 +160,12 @@ class NodeInput:
     middle: Array  # (nodes, w) midway to the next node, beyond the mean of both
     rate: Array  # (nodes, w) per s, smoothed
     jumps: Array  # (nodes, w) see jumps_of
+    doubt: Array  # (nodes,) variance of each component over an interval that was not sampled
 
     def between(self, first: int, last: int) -> NodeInput:
         """The input at nodes ``first`` to ``last``."""
         cut = slice(first, last + 1)
-        return NodeInput(self.values[cut], self.middle[cut], self.rate[cut], self.jumps[cut])
+        return NodeInput(self.values[cut], self.middle[cut], self.rate[cut], self.jumps[cut], self.doubt[cut])
 
 
 def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInput:
@@ -179,7 +180,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     jumps = jumps_of(line, noise)
     rate = rate_of_change(grid, line)
     if grid.nodes < 5:
-        return NodeInput(line, np.zeros_like(line), rate, jumps)
+        return NodeInput(line, np.zeros_like(line), rate, jumps, np.zeros(grid.nodes))
     rough = np.any(jumps != 0.0, axis=1)[:, None]
     rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
     curved = np.zeros_like(line)
@@ -191,7 +192,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     smooth = np.where(rough, line, line - over * curved)
     middle = np.zeros_like(line)
     middle[1:-2] = (smooth[1:-2] + smooth[2:-1] - smooth[:-3] - smooth[3:]) / 16.0
-    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, jumps)
+    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, jumps, np.zeros(grid.nodes))
 
 
 def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
@@ -225,6 +226,8 @@ def cubic_error(time: Array, values: Array, noise: Array, step: float) -> Array:
     return np.asarray(np.sqrt(np.sum(signal * share[:, None] ** 2, axis=0)))
 
 
+#: Part of an interval by which one may differ from the others before samples count as uneven.
+UNEVEN = 0.2
 #: Stretch over which motion is a cubic to well below any sensor's noise, s.
 LOCAL = 0.06
 
@@ -238,7 +241,25 @@ def sample_noise_std(time: Array, values: Array, local: float = LOCAL) -> Array:
     window = max(7, 2 * int(0.5 * local * rate) + 1)
     if time.size < 2 * window:
         return np.asarray(np.std(values, axis=0) + 1e-12)
+    steps = np.diff(time)
+    if np.mean(np.abs(steps - np.median(steps)) > UNEVEN * np.median(steps)) > 1.0 / window:
+        return _uneven_noise_std(time, values, window)
     rest = values - savgol_filter(values, window, 3, axis=0)
     # A smoother with hat matrix H leaves (1 - H_ii) of white noise's variance, H being a projection there
     kept = 1.0 - savgol_coeffs(window, 3)[window // 2]
     return np.asarray(np.std(rest, axis=0) / np.sqrt(kept))
+
+
+def _uneven_noise_std(time: Array, values: Array, window: int) -> Array:
+    """The same of samples that are not equidistant: what cubics through ``window`` of them each leave."""
+    count = time.size // window
+    at = time[: count * window].reshape(count, window)
+    at = at - np.mean(at, axis=1, keepdims=True)
+    reach = np.max(np.abs(at), axis=1)
+    # A gap inside makes the stretch too long for a cubic
+    chosen = reach < 2.0 * np.median(reach)
+    powers = (at[chosen] / reach[chosen, None])[:, :, None] ** np.arange(4)
+    blocks = values[: count * window].reshape(count, window, -1)[chosen]
+    basis = np.linalg.qr(powers)[0]
+    rest = blocks - basis @ (np.swapaxes(basis, 1, 2) @ blocks)
+    return np.asarray(np.sqrt(np.sum(rest**2, axis=(0, 1)) / (rest.shape[0] * (window - 4))))

@@ -3,8 +3,9 @@
 Under the model the whitened residuals of a channel are independent with unit variance, so each
 ordinate of the normalised periodogram is exponential with mean one (Brockwell & Davis,
 "Time Series: Theory and Methods", prop. 10.2.1) and the sum over a band of m ordinates is
-Gamma(m). The level is taken from the series itself: a sensor noisier than described is
-white all the same.
+Gamma(m). The level is taken from the series itself where it is above one: a sensor noisier than described is
+white all the same. Where it is below, less is left than the model expects (of a slowly sampled force's error,
+say, at frequencies that it does not have), which is nothing against the model.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ def bands(residual: Array, rate: float) -> list[Band]:
     spectrum = np.abs(np.fft.rfft(residual - np.mean(residual))) ** 2 / n
     ordinates = spectrum[1 : (n - 1) // 2 + 1]
     # The median ordinate of white noise is ln 2 times the mean one; lines do not move it
-    level = float(np.median(ordinates)) / np.log(2.0)
-    if not level > 0.0:
+    typical = float(np.median(ordinates)) / np.log(2.0)
+    if not typical > 0.0:
         return []
+    level = max(1.0, typical)
     out, first, width = [], 0, 4
     while first < ordinates.size:
         last = min(first + width, ordinates.size)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import (
     Assumed,
     Ideal,
@@ -17,7 +18,9 @@ from rig_identification.estimate.identify import (
     only_watched,
     scores,
     with_pieces,
+    without_unseen_force,
 )
+from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.slack import spells_of
@@ -46,6 +49,32 @@ def identify(
         if progress is not None:
             progress(stage, fraction)
 
+    origins = near_origins(session.rig)
+    session = session if origins.given else moved(session, origins)
+    found, ideal = _identified(session, notify, assumed)
+    less = None
+    if found.mismatch.verdict == "unexplained" and all(
+        f.effect == "unknown" for f in found.mismatch.findings
+    ):
+        # An exciter whose topic is missing may have been off: only where nothing else is found was it not
+        less = without_unseen_force(session, ideal, lambda run: True)
+    if less is not None:
+        rest, _ = _identified(less.session, notify, assumed)
+        found = _without_unseen(found, rest, less.note)
+    return found if origins.given else told(found, origins)
+
+
+def _without_unseen(found: Identification, rest: Identification, note: str) -> Identification:
+    """The answer to what is left of a session, with the verdict on all of it."""
+    first = found.mismatch
+    mismatch = replace(first, explanation=f"{note} {first.explanation}")
+    figures = {**rest.figures, "ideal": found.figures.get("ideal", found)}
+    return replace(rest, mismatch=mismatch, notes=(*rest.notes, note), figures=figures)
+
+
+def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> tuple[Identification, Fitted]:
+    """The answer to a session, and the ideal model's fit."""
+
     def searching(stage: str, fraction: float) -> None:
         notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
 
@@ -70,7 +99,7 @@ def identify(
             answer = replace(answer, total=total)
             if session.rig.frame is not None:
                 answer = replace(answer, without_frame=subtract_frame(total, session.rig.frame))
-            return replace(answer, figures={**answer.figures, "ideal": plain})
+            return replace(answer, figures={**answer.figures, "ideal": plain}), fitted
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
@@ -80,7 +109,7 @@ def identify(
     if found is None:
         ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
-        return plain if note is None else replace(plain, notes=(*plain.notes, note))
+        return (plain if note is None else replace(plain, notes=(*plain.notes, note))), fitted
     careful = None if found.mismatch.verdict == "explained" else found.ideal.careful
     answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose)
-    return replace(answer, figures={**answer.figures, "ideal": plain})
+    return replace(answer, figures={**answer.figures, "ideal": plain}), fitted

@@ -134,15 +134,17 @@ def _recording(
 ) -> Recording:
     tension: dict[str, Series] = {}
     others: dict[str, Series | None] = {}
+    unmeasured = False
     for channel in used:
         series = channel.series(start_ns)
+        unmeasured |= channel.topic.channel == "exciter_force" and series is None
         if channel.topic.cable is None:
             others[channel.topic.channel] = series
         elif series is not None:
             tension[channel.topic.cable] = series
     return Recording(
         name=entry.name, kind=entry.kind, holdout=entry.holdout, start_ns=start_ns, duration=duration,
-        dummy=entry.dummy, tension=tension, quality=quality, **others,
+        dummy=entry.dummy, tension=tension, exciter_unmeasured=unmeasured, quality=quality, **others,
     )  # fmt: skip
 
 

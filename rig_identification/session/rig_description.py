@@ -14,6 +14,8 @@ from rig_identification.session.topics import DEVICES
 
 #: No rig of this kind is larger; a value beyond is in mm.
 LARGEST_LENGTH = 100.0  # m
+#: A room may be surveyed from outside of it.
+FARTHEST_ORIGIN = 10_000.0  # m
 LENGTH_HINT = "is it in mm? lengths are in m"
 _CABLE_KEYS = ("ceiling_point", "body_point", "length", "load_cell")
 _MOUNTS = ("imu", "inclinometer", "exciter", "mocap")
@@ -47,6 +49,7 @@ def rig_from_fields(top: Fields) -> Rig:
     top.refuse_misspelt(_TOP_KEYS)
     cables = tuple(_cable(top, name) for name in _cable_names(top))
     _check_distinct_hinges(top, cables)
+    _check_ceiling(top, cables)
     _check_closure(top, cables)
     return Rig(
         gravity=top.number("gravity", "m/s^2", above=0.0, at_most=30.0, hint="give its magnitude"),
@@ -57,7 +60,7 @@ def rig_from_fields(top: Fields) -> Rig:
         imu=_mount(top, "imu"),
         inclinometer=_mount(top, "inclinometer", with_position=False),
         exciter=_mount(top, "exciter"),
-        mocap=_mount(top, "mocap"),
+        mocap=_marker_mount(top),
         noise=_noise(top),
         tolerance=_tolerance(top),
     )
@@ -107,7 +110,7 @@ def _cable(top: Fields, name: str) -> Cable:
     fields.refuse_misspelt(_CABLE_KEYS)
     return Cable(
         name=name,
-        ceiling_point=fields.vector("ceiling_point", 3, "m", limit=LARGEST_LENGTH, hint=LENGTH_HINT),
+        ceiling_point=fields.vector("ceiling_point", 3, "m", limit=FARTHEST_ORIGIN, hint=LENGTH_HINT),
         body_point=fields.vector("body_point", 3, "m", limit=LARGEST_LENGTH, hint=LENGTH_HINT),
         length=fields.number("length", "m", above=0.0, at_most=LARGEST_LENGTH, hint=LENGTH_HINT),
         load_cell=fields.choice("load_cell", ("ceiling", "body"), default="ceiling"),
@@ -121,6 +124,20 @@ def _check_distinct_hinges(top: Fields, cables: tuple[Cable, ...]) -> None:
         same_body = np.allclose(one.body_point, other.body_point, rtol=0.0, atol=1e-6)
         if same_ceiling and same_body:
             raise top.fault(other.name, f"has the same hinge points as {one.name}; give its own")
+
+
+def _check_ceiling(top: Fields, cables: tuple[Cable, ...]) -> None:
+    """Where the world's origin lies is free; how far the ceiling points lie apart is not."""
+    first = cables[0]
+    for cable in cables[1:]:
+        apart = np.abs(cable.ceiling_point - first.ceiling_point)
+        a = int(np.argmax(apart))
+        if apart[a] > LARGEST_LENGTH:
+            raise top.fault(
+                f"{cable.name}.ceiling_point[{a}]",
+                f"{cable.ceiling_point[a]:g} m is {apart[a]:g} m from that of {first.name}, "
+                f"beyond {LARGEST_LENGTH:g} m; {LENGTH_HINT}",
+            )
 
 
 def _check_closure(top: Fields, cables: tuple[Cable, ...]) -> None:
@@ -185,6 +202,16 @@ def _mount(top: Fields, name: str, *, with_position: bool = True) -> Mount | Non
     else:
         position = np.zeros(3)
     return Mount(position, fields.quaternion("orientation"))
+
+
+def _marker_mount(top: Fields) -> Mount | None:
+    """Motion capture's mount; half of one is taken as not given, since all that is not given is estimated."""
+    if not top.has("mocap"):
+        return None
+    fields = top.section("mocap", "position and orientation")
+    fields.refuse_misspelt(("position", "orientation"))
+    whole = fields.has("position") and fields.has("orientation")
+    return _mount(top, "mocap") if whole else None
 
 
 def _noise(top: Fields) -> dict[str, float]:
