@@ -82,8 +82,11 @@ def _tether(
     )
 
 
-def hinges_of_thread(rig: Rig, mass: float) -> list[Candidate]:
-    """What hinges do that are no joints: knots, bridles and clamped wires. mass: kg, roughly."""
+def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
+    """What small bodies on threads show besides. mass: kg, roughly.
+
+    Hinges that are no joints: knots, bridles and clamped wires; and the air that a turning body stirs.
+    """
     n = len(rig.cables)
     block = layout.effects_offset(n)
     length = float(np.mean([c.length for c in rig.cables]))
@@ -103,7 +106,17 @@ def hinges_of_thread(rig: Rig, mass: float) -> list[Candidate]:
             {"channel": None, "axis": None},
             positive=1,
             name_in_result="damping",
-        )
+        ),
+        Candidate(
+            "air_drag",
+            (_added("air.turning", "m^5", 3.0 * size**2 * (0.5 * size) ** 3, block + place.TURNING_DRAG),),
+            "The air resists the body's turning with the square of its rate: Cd A r^3 = {value}, for a plate "
+            "of area A at distance r.",
+            "Turn it slowly, or keep the drag in the model.",
+            {"channel": None, "axis": None},
+            positive=1,
+            name_in_result="turning_drag",
+        ),
     ]
     line = _line_of_hinges(rig)
     return out if line is None else [*out, _rolling(rig, mass, size, line)]
@@ -139,8 +152,8 @@ def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
         "unknown",
         (roll,),
         "The body is not free to roll about the line of its hinges: a moment of {value} holds it against the "
-        "mean direction of its cables, as a bridle, a loop round a bar or a stiff knot does. What such hinges "
-        "do to the turning about the vertical cannot be told from inertia, and is left out.",
+        "mean direction of its cables, as a bridle, a loop round a bar or a stiff knot does. What such "
+        "hinges do to the turning about the vertical cannot be told from inertia, and is left out.",
         "Hang the body on single points, or keep the stiffness in the model.",
         {"channel": None, "axis": None, "end": "body"},
         positive=1,

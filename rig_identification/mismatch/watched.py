@@ -26,7 +26,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.hands import hand_finding
-from rig_identification.mismatch.left_out_physics import hinges_of_thread, left_out_physics
+from rig_identification.mismatch.left_out_physics import left_out_physics, physics_of_pendulums
 from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import Trial, finished, log_evidence, mass_of, needed_gain, signs
 from rig_identification.result import Mismatch
@@ -207,7 +207,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     rig, parameters = ideal.problem.bench.rig, ideal.problem.bench.parameters
     mass = mass_of(parts, evaluation)
     candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
-    candidates += hinges_of_thread(rig, mass)
+    candidates += physics_of_pendulums(rig, mass)
     found, damped, rivals = _damped(raw, parts, evaluation, candidates, notify)
     if not found:
         return None

@@ -6,6 +6,7 @@ from numba import njit
 
 from rig_identification.model.effects.air_added_mass import add_air_added_mass
 from rig_identification.model.effects.air_drag import add_air_drag
+from rig_identification.model.effects.air_turning import add_air_turning
 from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.gyroscopic_share import add_gyroscopic_share
@@ -68,6 +69,7 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     add_hinge_bending(physics, block, modes, x, R, r)
     add_hinge_roll(physics, block, modes, x, R, r)
     add_air_drag(physics, block, x, R, r)
+    add_air_turning(physics, block, x, r)
     add_air_added_mass(physics, block, x, K, r)
     add_exciter_rotor(physics, block, x, R, K, r)
     add_gyroscopic_share(physics, block, x, r)

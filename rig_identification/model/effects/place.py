@@ -19,14 +19,15 @@ LINEAR_DENSITY = 5  # kg/m
 GYROSCOPIC_SHARE = 6  # 1: share of the gyroscopic moment that the model lacks
 BENDING = 7  # N m s/rad
 ROLL_STIFFNESS = 8  # N m/rad
-TETHER_STIFFNESS = 9  # 3: N/m, world axes
-TETHER_PULL = 12  # 3: N, world axes
-TETHER_POINT = 15  # 3: m, body
-REFERENCE_POSITION = 18  # 3: m, world
-REFERENCE_ROTATION = 21  # 9: rotation matrix, row by row
-ROLL_AXIS = 30  # 3: unit vector in body, a constant of the session like the reference pose
-SHARING = 33  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-EFFECTS_SIZE = 34
+TURNING_DRAG = 9  # m^5
+TETHER_STIFFNESS = 10  # 3: N/m, world axes
+TETHER_PULL = 13  # 3: N, world axes
+TETHER_POINT = 16  # 3: m, body
+REFERENCE_POSITION = 19  # 3: m, world
+REFERENCE_ROTATION = 22  # 9: rotation matrix, row by row
+ROLL_AXIS = 31  # 3: unit vector in body, a constant of the session like the reference pose
+SHARING = 34  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+EFFECTS_SIZE = 35
 
 
 def effects_block(cables: int) -> int:
