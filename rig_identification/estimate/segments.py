@@ -119,7 +119,7 @@ def _swing(run: Run, cut: tuple[Run, ...]) -> Array:
     for piece in cut:
         off = [(c.values - middle[c.device, c.quantity]) / c.noise for c in piece.channels]
         out.append(np.sqrt(np.mean(np.concatenate([o.ravel() for o in off]) ** 2)))
-    return np.maximum(np.array(out), 1e-12)
+    return np.asarray(np.maximum(np.array(out), 1e-12))
 
 
 def with_noise_of_swing(run: Run) -> Run:
