@@ -110,15 +110,25 @@ def test_the_part_in_which_a_person_drives_is_found(cradle: Answered) -> None:
 
 
 def test_what_damps_it_is_found(cradle: Answered) -> None:
-    damping = next(f for f in cradle.answer.mismatch.findings if f.effect == "hinge_damping")
-    value, std = damping.parameters["damping"]["value"], damping.parameters["damping"]["std"]
-    # Yaw loses 3 % of its amplitude a second: energy c w^2 (two cables, four hinges at half the twist)
-    assert value == pytest.approx(2.0 * 0.03 * element(cradle.answer, "Jzz"), rel=0.3)  # type: ignore[call-overload]
-    assert 0.0 < std < 0.5 * value  # type: ignore[operator]
+    dampers = [f for f in cradle.answer.mismatch.findings if f.effect == "hinge_damping"]
+    assert dampers
+    for f in dampers:
+        value, std = f.parameters["damping"]["value"], f.parameters["damping"]["std"]
+        assert 0.0 < std < 0.5 * value  # type: ignore[operator]
+    # What hinges of c take from yaw: each cable is bent by D/2h of it at both ends and, where they do not
+    # twist freely, twisted by half of it at each. Its amplitude falls by 3 % a second: energy by 2 J rate w^2
+    first, second = cradle.session.rig.cables
+    lean = 0.5 * float(np.linalg.norm(first.body_point - second.body_point)) / first.length
+    power = 0.0
+    for f in dampers:
+        twists = "twist freely" not in f.statement
+        power += float(f.parameters["damping"]["value"]) * (4.0 * lean**2 + (1.0 if twists else 0.0))  # type: ignore[arg-type]
+    assert power == pytest.approx(2.0 * 0.03 * element(cradle.answer, "Jzz"), rel=0.3)
+    damping = dampers[0]
     before, after = damping.evidence["holdout_error_before"], damping.evidence["holdout_error_after"]
     assert before is not None
     assert after is not None
-    assert after < 0.75 * before
+    assert after < before / 3.0
 
 
 def test_it_takes_no_longer_than_a_person_waits(cradle: Answered) -> None:

@@ -68,7 +68,8 @@ class FreePart:
     held: tuple[tuple[float, float], ...]  # stretches (s) in which something else acts
 
 
-#: A piece counts as driven where it fits so many times worse than the calm half of the run.
+#: A piece counts as driven where it fits so many times worse than the calm half of the run, both in units of
+#: noise and as a share of how far the body is from the run's middle.
 DRIVEN = 3.0
 #: Length of the pieces that are told apart, s.
 SHORT_PIECE = 2.0
@@ -77,16 +78,18 @@ SHORT_PIECE = 2.0
 def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart:
     """Find the free stretch: short pieces are fitted by start states alone, and the bad ones are driven.
 
-    The yardstick is the better half of the pieces that move; a piece at rest fits always and says nothing.
+    The yardstick is the better half of the pieces. A piece at rest fits always and says nothing; what the
+    model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand.
     """
     cut = pieces(run, SHORT_PIECE)
     errors = np.full(len(cut), np.inf)
+    swing = _swing(run, cut)
     for i, piece in enumerate(cut):
         fitted = fit_start(problem.bench, piece, theta, launch_state(problem.bench, piece, theta, rest))
         if fitted is not None:
             errors[i] = float(np.sqrt(np.mean(fitted[0].residual ** 2)))
-    calm = float(np.median(np.sort(errors)[: max(1, (len(cut) + 1) // 2)]))
-    driven = errors > DRIVEN * calm
+    shares = errors / swing
+    driven = (errors > DRIVEN * _calm(errors)) & (shares > DRIVEN * _calm(shares))
     best, begin = (0, 0), 0
     for i in range(len(cut) + 1):
         if i == len(cut) or driven[i]:
@@ -103,6 +106,21 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
         if bad
     )
     return FreePart(run.between(a, b), first.offset, last.offset + last.grid.duration, held)
+
+
+def _calm(errors: Array) -> float:
+    """Median of the better half."""
+    return float(np.median(np.sort(errors)[: max(1, (errors.size + 1) // 2)]))
+
+
+def _swing(run: Run, cut: tuple[Run, ...]) -> Array:
+    """(pieces,) root mean square distance of each piece from the run's middle, in units of noise."""
+    middle = {(c.device, c.quantity): np.median(c.values, axis=0) for c in run.channels}
+    out = []
+    for piece in cut:
+        off = [(c.values - middle[c.device, c.quantity]) / c.noise for c in piece.channels]
+        out.append(np.sqrt(np.mean(np.concatenate([o.ravel() for o in off]) ** 2)))
+    return np.asarray(np.maximum(np.array(out), 1e-12))
 
 
 def with_noise_of_swing(run: Run) -> Run:

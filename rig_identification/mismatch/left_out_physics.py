@@ -26,7 +26,7 @@ from rig_identification.rig import Rig
 SHORT_HOSE = 1.0
 
 
-def _added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -> Parameter:
+def added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -> Parameter:
     return Parameter(name, unit, nominal, std, "physics", entry, bounded=False)
 
 
@@ -40,7 +40,7 @@ def _tether(
     """
     spring, pull = 0.2 * mass * gravity / length, 0.02 * mass * gravity
     parts = [
-        _added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
+        added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
         for what, unit, std, entry in (
             ("stiffness", "N/m", spring, place.TETHER_STIFFNESS),
             ("pull", "N", pull, place.TETHER_PULL),
@@ -49,10 +49,10 @@ def _tether(
     ]
     if len(axes) == 1:
         first, second = (block + place.TETHER_STIFFNESS + i for i, a in enumerate(AXES) if a != axes)
-        aside = _added("tether.sideways", "N/m", pull / SHORT_HOSE, first)
+        aside = added("tether.sideways", "N/m", pull / SHORT_HOSE, first)
         parts.append(replace(aside, also=(second,)))
     parts += [
-        _added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
+        added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
         for i, a in enumerate(AXES)
     ]
 
@@ -96,7 +96,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         Candidate(
             "hinge_damping",
             (
-                _added(
+                added(
                     "hinge.damping", "N*m*s/rad", 0.1 * mass * length * speed / (2 * n), block + place.DAMPING
                 ),
             ),
@@ -108,7 +108,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         ),
         Candidate(
             "hinge_friction",
-            (_added("hinge.friction", "N*m", 0.003 * mass * rig.gravity / n, block + place.FRICTION),),
+            (added("hinge.friction", "N*m", 0.003 * mass * rig.gravity / n, block + place.FRICTION),),
             "The cables' hinges rub: each holds against turning with {value}.",
             "Grease or replace the hinges; dry friction spoils small motions most.",
             {"channel": None, "axis": None},
@@ -117,7 +117,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         ),
         Candidate(
             "air_drag",
-            (_added("air.drag_area", "m^2", 3.0 * size**2, block + place.DRAG_AREA),),
+            (added("air.drag_area", "m^2", 3.0 * size**2, block + place.DRAG_AREA),),
             "The air resists with the square of speed: a drag area of {value}.",
             "Keep speeds low, or keep the drag in the model.",
             {"channel": None, "axis": None},
@@ -126,7 +126,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         ),
         Candidate(
             "air_added_mass",
-            (_added("air.added_mass", "kg", 0.02 * mass, block + place.ADDED_MASS),),
+            (added("air.added_mass", "kg", 0.02 * mass, block + place.ADDED_MASS),),
             "Air that moves with the body adds {value} to its inertia but not to its weight.",
             "Motion alone cannot tell entrained air from inertia: it shows against scale and statics.",
             {"channel": None, "axis": None},
@@ -135,7 +135,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         ),
         Candidate(
             "cable_mass",
-            (_added("cable.linear_density", "kg/m", 0.002 * mass / n, block + place.LINEAR_DENSITY),),
+            (added("cable.linear_density", "kg/m", 0.002 * mass / n, block + place.LINEAR_DENSITY),),
             "The cables weigh {value}.",
             "Weigh a length of the cable and enter it.",
             {"channel": None, "axis": None},
@@ -148,7 +148,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         out.append(
             Candidate(
                 "exciter_rotor",
-                (_added("exciter.rotor_mass", "kg", 0.03 * mass, block + place.ROTOR_MASS),),
+                (added("exciter.rotor_mass", "kg", 0.03 * mass, block + place.ROTOR_MASS),),
                 "The exciter's moving mass of {value} rides on the body, unweighed.",
                 "Weigh the motor with its unbalance and add it to the body.",
                 {"channel": "exciter", "axis": None},
@@ -178,7 +178,7 @@ def _less_the_rotor(problem: Problem, point: Point, evaluation: Evaluation) -> P
 
 def _gyroscopic_term(block: int, lacking: float) -> Candidate:
     """The gyroscopic moment, where the ideal model lacks a share of it: in nature none is missing."""
-    share = _added("gyroscopic_share", "1", 1.0, block + place.GYROSCOPIC_SHARE, lacking)
+    share = added("gyroscopic_share", "1", 1.0, block + place.GYROSCOPIC_SHARE, lacking)
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
         return {"share": (1.0 - values[share.name], stds[share.name], "1")}

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.cautious import reweighted, solve_cautiously
+from rig_identification.estimate.cautious import coherence, reweighted, solve_cautiously
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import Ideal, Scores, judged, parameter_estimates
@@ -27,8 +27,9 @@ from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.hands import hand_finding
 from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import Trial, finished, log_evidence, mass_of, needed_gain, signs
+from rig_identification.mismatch.threads import physics_of_pendulums
 from rig_identification.result import Mismatch
 
 Notify = Callable[[str, float], None]
@@ -61,38 +62,92 @@ def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Tr
     point = carried(wide, problem, evaluation.point)
     theta = point.theta.copy()
     theta[wide.bench.parameters.index_of(candidate.parameters[0].name)] = FIRST_VALUE
+    point, steps = replace(point, theta=theta), STEPS
+    if candidate.settle is not None:
+        # From another body: the way to its best is longer
+        point, steps = candidate.settle(wide, point, evaluation), 3 * STEPS
     try:
-        fitted, _ = solve(wide, replace(point, theta=theta), iterations=STEPS, tolerance=0.5)
+        fitted, _ = solve(wide, point, iterations=steps, tolerance=0.5)
     except FloatingPointError:
         return None
     return finished(Trial(candidate, wide, fitted, log_evidence(fitted), True))
 
 
+def _weighed(raw: Problem, problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
+    """The model of ``problem`` on the pieces of ``raw``, each channel weighed by what it leaves now, fitted.
+
+    raw: pieces with the sensors' own noise. Weights that an earlier, poorer model set would hide from a
+    better one what it still leaves.
+    """
+    bare = replace(problem, runs=raw.runs)
+    now = evaluate(bare, evaluation.point)
+    if now is None:
+        return problem, evaluation
+    heavy = reweighted(bare, now)
+    return heavy, solve(heavy, evaluation.point, iterations=STEPS, tolerance=0.5)[0]
+
+
+def _tempered(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
+    """The same with residuals that follow the motion counted as one error each, fitted again.
+
+    Taken as many independent ones they would outweigh what a tape measure says of the rig, and bend it.
+    """
+    factor = np.sqrt(coherence(problem, evaluation))
+    runs = tuple(
+        replace(run, channels=tuple(replace(c, noise=factor * c.noise) for c in run.channels))
+        for run in problem.runs
+    )
+    mild = replace(problem, runs=runs)
+    return mild, solve(mild, evaluation.point, iterations=2 * STEPS, tolerance=0.1)[0]
+
+
+def _better(
+    problem: Problem, evaluation: Evaluation, left: list[Candidate], count: int, notify: Callable[[str], None]
+) -> list[Trial]:
+    """Trials that gain more than chance over ``count`` does, likeliest first."""
+    base, tried = log_evidence(evaluation), []
+    for candidate in left:
+        notify(f"search: {candidate.label}")
+        trial = _trial(problem, evaluation, candidate)
+        if trial is not None and trial.evidence - base > needed_gain(candidate, count):
+            tried.append(trial)
+    return sorted(tried, key=lambda t: -t.evidence)
+
+
 def _damped(
-    problem: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
+    raw: Problem, problem: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
 ) -> tuple[list[Trial], Evaluation, list[dict[str, object]]]:
-    """Effects added one by one while each gains more than chance, the fit, and rivals of the first."""
+    """Effects added one by one while each gains more than chance, the fit, and rivals of the first.
+
+    What damps comes first, for no swing is followed without it; then what changes the body's freedom, which
+    is no matter of degree; then what damps besides.
+    """
     found: list[Trial] = []
     rivals: list[dict[str, object]] = []
-    left, base_problem = list(candidates), problem
-    while left:
-        base = log_evidence(evaluation)
-        tried = []
-        for candidate in left:
-            notify(f"search: {candidate.label}", 0.2 + 0.2 * len(found))
-            trial = _trial(problem, evaluation, candidate)
-            if trial is not None:
-                tried.append(trial)
-        tried = [t for t in tried if t.evidence - base > needed_gain(t.candidate, len(candidates))]
-        if not tried:
+    dampers = [c for c in candidates if c.effect in DAMPERS]
+    holds = [c for c in candidates if c.effect not in DAMPERS]
+    base_problem, count, left = problem, len(candidates), dampers
+    while left or holds:
+
+        def told(stage: str) -> None:
+            notify(stage, 0.2 + 0.1 * len(found))
+
+        tried = _better(problem, evaluation, left, count, told)
+        if tried:
+            if not found:
+                rivals = [rival(t, tried[0]) for t in tried[1:]]
+            found.append(tried[0])
+            problem, evaluation = tried[0].problem, tried[0].evaluation
+        if holds:
+            held = _better(problem, evaluation, holds, count, told)
+            holds = []
+            if held:
+                problem, evaluation = _weighed(raw, held[0].problem, held[0].evaluation)
+                found.append(replace(held[0], problem=problem, evaluation=evaluation))
+        elif not tried:
             break
-        tried.sort(key=lambda t: -t.evidence)
-        best = tried[0]
-        if not found:
-            rivals = [rival(t, best) for t in tried[1:]]
-        found.append(best)
-        problem, evaluation = best.problem, best.evaluation
-        left = [c for c in left if c.label != best.candidate.label]
+        names = {t.candidate.parameters[0].name for t in found}
+        left = [c for c in dampers if c.parameters[0].name not in names] if found else []
     return (*_needed(base_problem, found, evaluation), rivals)
 
 
@@ -144,19 +199,21 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     notify("fitting in pieces", 0.05)
     start = found_ideal.careful[1].point.theta
     guesses = ideal.evaluation.point.rest_guesses
-    parts, point = in_pieces(ideal.problem, start, ideal.rest, guesses, LONG_PIECE)
+    known = with_reference(ideal.problem, ideal.rest)
+    parts, point = in_pieces(known, start, ideal.rest, guesses, LONG_PIECE)
     evaluation, _ = solve(parts, point, iterations=STEPS, tolerance=0.5)
-    parts = reweighted(parts, evaluation)
+    raw, parts = parts, reweighted(parts, evaluation)
     again = evaluate(parts, evaluation.point)
     evaluation = evaluation if again is None else again
     rig, parameters = ideal.problem.bench.rig, ideal.problem.bench.parameters
-    every = left_out_physics(rig, parameters, mass_of(parts, evaluation))
-    candidates = [c for c in every if c.effect in DAMPERS]
-    found, damped, rivals = _damped(parts, evaluation, candidates, notify)
+    mass = mass_of(parts, evaluation)
+    candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
+    candidates += physics_of_pendulums(rig, mass)
+    found, damped, rivals = _damped(raw, parts, evaluation, candidates, notify)
     if not found:
         return None
     notify("weighing each channel by its residual", 0.75)
-    careful = solve_cautiously(found[-1].problem, damped.point)
+    careful = _tempered(*solve_cautiously(replace(found[-1].problem, runs=raw.runs), damped.point))
     notify("search: whole runs", 0.85)
     fitted = _whole(ideal, found, careful[0], careful[1])
     after, verdict = judged(fitted)

@@ -6,19 +6,24 @@ from numba import njit
 
 from rig_identification.model.effects.air_added_mass import add_air_added_mass
 from rig_identification.model.effects.air_drag import add_air_drag
+from rig_identification.model.effects.air_turning import add_air_turning
 from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.gyroscopic_share import add_gyroscopic_share
+from rig_identification.model.effects.hinge_bending import add_hinge_bending
 from rig_identification.model.effects.hinge_damping import add_hinge_damping
 from rig_identification.model.effects.hinge_friction import add_hinge_friction
+from rig_identification.model.effects.hinge_roll import add_hinge_roll
 from rig_identification.model.effects.internal import add_internal
 from rig_identification.model.effects.place import (
     ADDED_MASS,
+    BENDING,
     DAMPING,
     DRAG_AREA,
     FRICTION,
     GYROSCOPIC_SHARE,
     LINEAR_DENSITY,
+    ROLL_STIFFNESS,
     ROTOR_MASS,
     TETHER_POINT,
     active,
@@ -37,6 +42,7 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     body = body or active(physics[block + GYROSCOPIC_SHARE])
     rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
+    hinges = hinges or active(physics[block + BENDING]) or active(physics[block + ROLL_STIFFNESS])
     return body, rotor or rods or internal > 0, rotor, rods or hinges
 
 
@@ -60,7 +66,10 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
         return
     add_hinge_damping(physics, block, modes, x, R, r)
     add_hinge_friction(physics, block, modes, x, R, r)
+    add_hinge_bending(physics, block, modes, x, R, r)
+    add_hinge_roll(physics, block, modes, x, R, r)
     add_air_drag(physics, block, x, R, r)
+    add_air_turning(physics, block, x, r)
     add_air_added_mass(physics, block, x, K, r)
     add_exciter_rotor(physics, block, x, R, K, r)
     add_gyroscopic_share(physics, block, x, r)

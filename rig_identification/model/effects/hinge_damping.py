@@ -20,4 +20,4 @@ def add_hinge_damping(physics, block, modes, x, R, r):  # type: ignore[no-untype
     """Add the force and moment of viscous hinges to r."""
     damping = physics[block + DAMPING]
     if active(damping):
-        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, r)
+        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, 1.0, r)

@@ -13,4 +13,4 @@ def add_hinge_friction(physics, block, modes, x, R, r):  # type: ignore[no-untyp
     """Add the force and moment of rubbing hinges to r."""
     torque = physics[block + FRICTION]
     if active(torque):
-        add_hinge_moments(physics, modes, x, R, 0.0 * torque, torque, r)
+        add_hinge_moments(physics, modes, x, R, 0.0 * torque, torque, 1.0, r)

@@ -26,8 +26,11 @@ def _law(viscous, rubbing, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def add_hinge_moments(physics, modes, x, R, viscous, rubbing, r):  # type: ignore[no-untyped-def]
-    """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in every hinge."""
+def add_hinge_moments(physics, modes, x, R, viscous, rubbing, twist, r):  # type: ignore[no-untyped-def]
+    """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in every hinge.
+
+    twist: 1 where a hinge resists being twisted as it resists being bent, 0 where it twists freely.
+    """
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
     v0, v1, v2 = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
     vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
@@ -53,8 +56,10 @@ def add_hinge_moments(physics, modes, x, R, viscous, rubbing, r):  # type: ignor
         ax, ay, az = wx - ox, wy - oy, wz - oz
         # A massless cable cannot hold a moment about itself: it spins at half the body's twist, so that
         # its two hinges, alike, pass on the same moment
-        half = 0.5 * (ex * ax + ey * ay + ez * az)
-        ax, ay, az = ax - half * ex, ay - half * ey, az - half * ez
+        spin = ex * ax + ey * ay + ez * az
+        half = 0.5 * twist * spin
+        off = spin - half
+        ax, ay, az = ax - off * ex, ay - off * ey, az - off * ez
         ox, oy, oz = ox + half * ex, oy + half * ey, oz + half * ez
         lower = _law(viscous, rubbing, ax, ay, az)
         upper = _law(viscous, rubbing, ox, oy, oz)

@@ -17,13 +17,17 @@ ADDED_MASS = 3  # kg
 ROTOR_MASS = 4  # kg
 LINEAR_DENSITY = 5  # kg/m
 GYROSCOPIC_SHARE = 6  # 1: share of the gyroscopic moment that the model lacks
-TETHER_STIFFNESS = 7  # 3: N/m, world axes
-TETHER_PULL = 10  # 3: N, world axes
-TETHER_POINT = 13  # 3: m, body
-REFERENCE_POSITION = 16  # 3: m, world
-REFERENCE_ROTATION = 19  # 9: rotation matrix, row by row
-SHARING = 28  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-EFFECTS_SIZE = 29
+BENDING = 7  # N m s/rad
+ROLL_STIFFNESS = 8  # N m/rad
+TURNING_DRAG = 9  # m^5
+TETHER_STIFFNESS = 10  # 3: N/m, world axes
+TETHER_PULL = 13  # 3: N, world axes
+TETHER_POINT = 16  # 3: m, body
+REFERENCE_POSITION = 19  # 3: m, world
+REFERENCE_ROTATION = 22  # 9: rotation matrix, row by row
+ROLL_AXIS = 31  # 3: unit vector in body, a constant of the session like the reference pose
+SHARING = 34  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+EFFECTS_SIZE = 35
 
 
 def effects_block(cables: int) -> int:

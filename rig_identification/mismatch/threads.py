@@ -1,0 +1,107 @@
+"""Physics of small bodies on threads, which a watched pendulum shows and a rig of steel does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.observability import believed_point
+from rig_identification.estimate.parameters import INERTIAL, Parameter
+from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.left_out_physics import added
+from rig_identification.model import layout
+from rig_identification.model.effects import place
+from rig_identification.model.motion import RigModel
+from rig_identification.rig import Rig
+
+
+def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
+    """What small bodies on threads show besides. mass: kg, roughly.
+
+    Hinges that are no joints: knots, bridles and clamped wires; and the air that a turning body stirs.
+    """
+    n = len(rig.cables)
+    block = layout.effects_offset(n)
+    length = float(np.mean([c.length for c in rig.cables]))
+    size = float(np.max(extent(rig)))
+    speed = np.sqrt(rig.gravity * length)
+    out = [
+        Candidate(
+            "hinge_damping",
+            (
+                added(
+                    "hinge.bending", "N*m*s/rad", 0.1 * mass * length * speed / (2 * n), block + place.BENDING
+                ),
+            ),
+            "The cables' hinges damp the motion as they bend, and twist freely: each puts {value} against "
+            "the rate at which it bends.",
+            "Use knife edges or ball joints, or keep the damping in the model.",
+            {"channel": None, "axis": None},
+            positive=1,
+            name_in_result="damping",
+        ),
+        Candidate(
+            "air_drag",
+            (added("air.turning", "m^5", 3.0 * size**2 * (0.5 * size) ** 3, block + place.TURNING_DRAG),),
+            "The air resists the body's turning with the square of its rate: Cd A r^3 = {value}, for a plate "
+            "of area A at distance r.",
+            "Turn it slowly, or keep the drag in the model.",
+            {"channel": None, "axis": None},
+            positive=1,
+            name_in_result="turning_drag",
+        ),
+    ]
+    line = _line_of_hinges(rig)
+    return out if line is None else [*out, _rolling(rig, mass, size, line)]
+
+
+def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
+    """Hinges that hold the body against rolling about their ``line``: no word of the contract fits."""
+    block = layout.effects_offset(len(rig.cables))
+    axis = block + place.ROLL_AXIS
+    roll = added("hinge.roll_stiffness", "N*m/rad", mass * rig.gravity * size, block + place.ROLL_STIFFNESS)
+    height = float(np.mean([c.body_point[2] for c in rig.cables]))
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        physics = model.physics.copy()
+        physics[axis : axis + 3] = line
+        return model.with_physics(physics), (roll,)
+
+    def settle(problem: Problem, point: Point, evaluation: Evaluation) -> Point:
+        """A body that such hinges alone keep upright: a fit without them holds it far below the hinges."""
+        parameters = problem.bench.parameters
+        theta = believed_point(problem, replace(evaluation, point=point))
+        elements = parameters.elements(theta)
+        elements[3] = height + 0.1 * size
+        theta = np.concatenate([parameters.start(elements)[:INERTIAL], point.theta[INERTIAL:]])
+        theta[parameters.index_of(roll.name)] = 0.5
+        starts = tuple(
+            launch_state(problem.bench, run, theta, start)
+            for run, start in zip(problem.runs, point.starts, strict=True)
+        )
+        return replace(point, theta=theta, starts=starts)
+
+    return Candidate(
+        "unknown",
+        (roll,),
+        "The body is not free to roll about the line of its hinges: a moment of {value} holds it against the "
+        "mean direction of its cables, as a bridle, a loop round a bar or a stiff knot does. What such "
+        "hinges do to the turning about the vertical cannot be told from inertia, and is left out.",
+        "Hang the body on single points, or keep the stiffness in the model.",
+        {"channel": None, "axis": None, "end": "body"},
+        positive=1,
+        name_in_result="roll_stiffness",
+        build=build,
+        settle=settle,
+    )
+
+
+def _line_of_hinges(rig: Rig) -> np.ndarray | None:
+    """(3,) direction of the line that all body hinges lie on; None where they span a plane."""
+    points = np.array([c.body_point for c in rig.cables])
+    _, sizes, axes = np.linalg.svd(points - np.mean(points, axis=0))
+    return None if sizes[0] <= 0.0 or sizes[1] > 1e-2 * sizes[0] else np.asarray(axes[0])
