@@ -7,7 +7,8 @@ import pytest
 
 from rig_identification.model import layout
 from rig_identification.thesis import load_case
-from rig_identification.thesis.estimators import SEARCHES, fit_euler_predictor, fit_momentum
+from rig_identification.thesis.estimators import fit_euler_predictor, fit_momentum
+from rig_identification.thesis.predictor import SEARCHES
 from rig_identification.thesis_rerun.comparison import measured, signed_error, worst_percent
 from rig_identification.thesis_rerun.integration import check_integration, integrate
 from rig_identification.thesis_rerun.motion import STEP, fly_case

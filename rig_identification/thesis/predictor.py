@@ -43,7 +43,7 @@ class EulerPredictor:
             turning = np.cross(now[:, :, None], columns, axisa=1, axisb=1, axisc=1)
             parts.append(turning.reshape(self.samples, 18))
         self._all = np.concatenate(parts, axis=1)
-        self._rows = np.linalg.qr(self._all, mode="r")
+        self._rows = np.asarray(np.linalg.qr(self._all, mode="r"), dtype=float)
 
     def error(self, parameters: Array) -> Array | None:
         """(n - 1, 3) rad/s; None where J cannot be inverted."""

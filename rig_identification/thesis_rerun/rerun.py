@@ -125,9 +125,10 @@ def rerun(cases: tuple[Case, ...], progress: Progress, workers: int = 2, trackin
     """
     statics = rerun_statics() if tracking else None
     jobs = [(case.number, case.variant) for case in cases]
-    beside = [TRACKERS] * tracking + [PATIENT] * any(case.number == EXAMINED for case in cases)
+    beside = [PATIENT] * any(case.number == EXAMINED for case in cases) + [TRACKERS] * tracking
     # The long ones first, so that no process ends up alone with one of them
-    order = [*beside, *sorted(jobs, key=lambda job: job[0] not in (3, 4, MAPPED))]
+    longest = sorted(cases, key=lambda case: -case.duration)
+    order = [*beside, *((case.number, case.variant) for case in longest)]
     alone = workers < 2 or len(order) < 2
     found: dict[Job, Any] = dict(
         _in_turn(order, progress) if alone else _side_by_side(order, workers, progress)

@@ -1,8 +1,8 @@
 r"""Natural frequencies of a body on a rig, each with its shape in words.
 
-Small swings about rest on rigid cables. The body is a case study's (--case), or one given in ten numbers (--body),
-or the one that ``identify`` found (--result). Roll, pitch and yaw turn about the body's x, y and z axis; the
-shares are those of the swing's kinetic energy.
+Small swings about rest on rigid cables. The body is a case study's (--case), or one given in ten numbers
+(--body), or the one that ``identify`` found (--result). Roll, pitch and yaw turn about the body's x, y and z
+axis; the shares are those of the swing's kinetic energy.
 
   rig-identification modes --case 14
   rig-identification modes --rig session_a/rig.yaml --result out/result.json
