@@ -154,6 +154,8 @@ def _along(rows, parameters, weight, cost, direction):  # type: ignore[no-untype
 def _damped(rows, parameters, weight, cost, hessian, gradient, damping):  # type: ignore[no-untyped-def]
     """Raise the damping until the cost is no larger, then lower it for the next step (eq. 3.30)."""
     scale = np.diag(hessian)
+    if not scale.max() > 0.0:
+        return np.zeros(6), damping
     # What no sample tells is held by its damping alone
     scale = np.diag(np.maximum(scale, 1e-15 * scale.max()))
     for _ in range(HALVINGS):
