@@ -90,8 +90,8 @@ def _why_apart(result: CaseResult) -> str:
     if apart is None:
         return ""
     if apart <= GIVEN_BACK:
-        return f"published diagonal given back within {apart:.2f} points"
-    return f"published diagonal missed by up to {apart:.2g} points: what was tried stands with the case"
+        return f"given back within {apart:.2f} points"
+    return f"{apart:.2g} points off, see the case"
 
 
 def _from_where(result: CaseResult) -> str:
@@ -100,10 +100,15 @@ def _from_where(result: CaseResult) -> str:
     fits = {1.0: comparison.output_error, **comparison.far_off}
     lost = [f"{factor:g}" for factor, fit in fits.items() if not fit.converged]
     if lost:
-        return f"did not converge from the thesis' guess times {', '.join(lost)}"
-    worst = max(worst_percent(result.case, fit.inertia) for fit in fits.values())
+        return f"did not converge from guess × {', '.join(lost)}"
     times = ", ".join(f"{factor:g}" for factor in sorted(fits))
-    return f"worst element {worst:.1g} % from the thesis' guess times {times}"
+    return f"{worst_of_guesses(result):.1g} % at most, guess × {times}"
+
+
+def worst_of_guesses(result: CaseResult) -> float:
+    """Largest error of (d), percent, from any of the first guesses."""
+    fits = (result.comparison.output_error, *result.comparison.far_off.values())
+    return max(worst_percent(result.case, fit.inertia) for fit in fits)
 
 
 def _six(matrix: Array) -> tuple[float, ...]:

@@ -95,7 +95,8 @@ def rerun_case(case: Case) -> CaseResult:
     windows = convergence_map(motion, comparison.momentum.inertia) if case.number == MAPPED else None
     realistic = realistic_uncertainty(case, SEED)
     integration = check_integration(motion, SEED) if case.number == CHECKED else None
-    told = () if integration is None else (integration.statement,)
+    told = [] if integration is None else [integration.statement]
+    told += [] if windows is None else [windows.statement(case.inertia)]
     return CaseResult(
         case,
         motion.least_tension,
@@ -107,7 +108,7 @@ def rerun_case(case: Case) -> CaseResult:
         integration,
         modes_of(case),
         _traces(motion, comparison),
-        told + odd_statements(motion, comparison),
+        (*told, *odd_statements(motion, comparison)),
     )
 
 
