@@ -11,6 +11,7 @@ from rig_identification.thesis import load_case
 from rig_identification.thesis_report import rerun_document
 from rig_identification.thesis_report.integration_figures import integration_figures
 from rig_identification.thesis_report.sections import BEFORE, add_sections
+from rig_identification.thesis_report.summary import summary
 from rig_identification.thesis_rerun import Rerun, fly_case
 from rig_identification.thesis_rerun.integration import check_integration
 from rig_identification.thesis_rerun.statics import rerun_statics
@@ -55,13 +56,16 @@ def test_figures_stand_alone_in_the_order_of_the_thesis(written):
         root = ElementTree.parse(written / name).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
         assert len(root.findall(".//{*}path[@class='measured']")) == 3
+        told = [text.text for text in root.findall(".//{*}text")]
+        assert any(text.startswith("measured (grey)") for text in told)
 
 
 def test_page_holds_the_table_and_loads_nothing(written):
     page = (written / "report.html").read_text()
     assert "(a) thesis' predictor" in page or "(a) thesis&#39; predictor" in page
-    assert "guess times 0.2, 1, 5" in page
-    assert "published diagonal missed by up to" in page
+    assert "guess × 0.2, 1, 5" in page
+    assert "points off, see the case" in page
+    assert "(d) finds every element within" in page
     assert "171.89" in page or ">172<" in page
     assert page.index('id="wrench"') < page.index('id="table"')
     assert 'id="statics"' not in page  # chapter 2 comes with all cases alone
@@ -74,6 +78,8 @@ def test_chapters_2_and_3_stand_in_page_and_document():
     page = add_sections(f"<body>{BEFORE}</h2></body>", Environment(autoescape=True), found)
     assert all(number in page for number in ("609.860", "612.000", "-2.140"))
     table = rerun_document(found, 1.0)["table_2_1"]
+    (sentence,) = summary(found)
+    assert sentence.endswith("mm without noise (thesis: 2.1 mm).")
     assert abs(table["found_error"]).max() < 1e-5
     assert table["poses"] == [1, 1]
     assert all(table["std_of_inclinometer_alone"] < table["std"])

@@ -123,6 +123,7 @@ def test_map_of_case_5(case_1):
     spread = few.output_error_std[:, 0, 0]
     assert spread[-1] > 10.0 * spread[0]
     assert np.all(np.diff(few.output_error_std[:, 2, 2]) > -1e-9)  # fewer samples never tell more
+    assert few.statement(case_1.case.inertia).startswith(f"Of {WINDOWS // 30} windows")
 
 
 @pytest.mark.parametrize("number", [7, 8])

@@ -64,7 +64,7 @@ def _misses(found: Rerun) -> list[str]:
     off = {label: points for label, points in apart.items() if points is not None and points > GIVEN_BACK}
     if not off:
         return []
-    listed = ", ".join(f"{label} ({points:.1g})" for label, points in sorted(off.items(), key=lambda i: i[1]))
+    listed = ", ".join(f"{label} ({points:.2g})" for label, points in sorted(off.items(), key=lambda i: i[1]))
     return [
         f"Published diagonals that (a) does not give back, with the percentage points between: {listed}. "
         "What was tried stands with each case."
