@@ -141,3 +141,52 @@ def test_what_cannot_be_simulated_has_one_line(
     assert says in error
     assert error.count("\n") == 1
     assert not (tmp_path / "s").exists()
+
+
+def test_modes_of_a_case_and_of_what_was_identified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["modes", "--case", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(" (")[0] for line in lines] == [
+        "swings at 0.369 Hz: pitch with sway along x",
+        "swings at 0.402 Hz: sway along y with roll",
+    ]
+    rig = str(CONFIG / "trifilar.yaml")
+    assert main(["modes", "--rig", rig, "--body", *PLATE]) == 0
+    plate = capsys.readouterr().out
+    assert plate.count("Hz") == 3
+    m, cx, cy, cz, xx, xy, xz, yy, yz, zz = map(float, PLATE)
+    values = {
+        "mass": m,
+        "center_of_mass": [cx, cy, cz],
+        "inertia": [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]],
+    }
+    result = tmp_path / "result.json"
+    result.write_text(json.dumps({name: {"value": value} for name, value in values.items()}))
+    assert main(["modes", "--rig", rig, "--result", str(result)]) == 0
+    assert capsys.readouterr().out == plate
+    values["inertia"][2][2] = None
+    result.write_text(json.dumps({name: {"value": value} for name, value in values.items()}))
+    assert main(["modes", "--rig", rig, "--result", str(result)]) == 2
+    assert "Jzz not determined" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--case", "x"], "is no case study"),
+        (["--case", "1", "--body", *BAR], "has its own body"),
+        (["--rig", "RIG"], "says nothing of the inertia"),
+        (["--rig", "RIG", "--body", *NO_BODY], "no body has this mass and inertia"),
+        (["--rig", "RIG", "--result", "nowhere.json"], "No such file"),
+    ],
+)
+def test_modes_of_nothing_are_refused_in_one_line(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = str(CONFIG / "trifilar.yaml")
+    assert main(["modes", *(rig if a == "RIG" else a for a in arguments)]) == 2
+    error = capsys.readouterr().err.strip()
+    assert message in error
+    assert "\n" not in error

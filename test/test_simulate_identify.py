@@ -68,3 +68,23 @@ def test_with_noise_and_doubts_the_truth_lies_within_the_interval(number: int, s
     assert np.max(np.abs(z)) < 3.5
     # And the interval says something: the inertia to a percent of the largest
     assert np.max(std[4:]) < 0.01 * np.max(truth.elements[4:])
+
+
+def test_steps_of_force_leave_noise_and_the_truth_in_its_interval() -> None:
+    """Case 2 as the thesis prints it: 200 N come and go within a sample."""
+    spec = case_spec(load_case(2), duration=10.0, rest=5.0, holdout=False)
+    session, truth = simulate_session(spec, np.random.default_rng(5))
+    fitted = fit_session(session)
+    assert fitted.converged
+    estimate = inertial_estimate(fitted.problem, fitted.evaluation)
+    z = (estimate.values - truth.elements) / np.sqrt(np.diag(estimate.covariance))
+    assert np.max(np.abs(z)) < 3.5
+    run = fitted.problem.runs[0]
+    assert run.force is not None
+    jumps = np.flatnonzero(np.any(run.force.jumps != 0.0, axis=1))
+    assert jumps.size >= 3
+    for channel in run.channels:
+        away = np.abs(channel.time[:, None] - run.grid.step * (jumps + 0.5)[None])
+        assert away.min() > 2.9 * run.grid.step
+    residual = fitted.evaluation.runs[0].residual
+    assert np.mean(residual**2) < 1.05

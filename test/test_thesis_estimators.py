@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 
 from rig_identification.errors import InputError
-from rig_identification.thesis.estimators import (
-    SEARCHES,
-    fit_euler_predictor,
-    fit_momentum,
-)
-from rig_identification.thesis.predictor import tensor
+from rig_identification.thesis.estimators import fit_euler_predictor, fit_momentum
+from rig_identification.thesis.predictor import SEARCHES, EulerPredictor, tensor
 
 INERTIA = np.array([[1617.0, -20.0, 15.0], [-20.0, 365.0, 70.0], [15.0, 70.0, 1785.0]])
 GUESS = tensor(np.array([1000.0, 10.0, 10.0, 300.0, 40.0, 1000.0]))
@@ -119,6 +116,29 @@ def test_momentum_form_says_when_motion_does_not_tell():
     moment = np.zeros_like(about_z)
     moment[:, 2] = 1785.0 * np.cos(time)
     assert not fit_momentum(about_z, moment, 0.01).converged
+
+
+@pytest.mark.parametrize("gyroscopic", [False, True])
+def test_few_rows_in_place_of_all_samples_have_the_same_minimum(gyroscopic):
+    """A search by another hand on every sample, SciPy's Levenberg-Marquardt, ends at the same tensor."""
+    rate, moment = free_motion(0.01, duration=8.0)
+    predictor = EulerPredictor(rate, moment, 0.01, gyroscopic)
+    found = least_squares(
+        lambda p: predictor.error(p).ravel(), INERTIA[np.triu_indices(3)], method="lm", xtol=1e-14, ftol=1e-14
+    ).x
+    fit = fit_euler_predictor(rate, moment, 0.01, 0.5 * GUESS, gyroscopic=gyroscopic, criterion="sum")
+    assert fit.inertia == pytest.approx(tensor(found), rel=1e-5, abs=1e-3)
+    turning = np.cross(rate[:-1], rate[:-1] @ INERTIA) if gyroscopic else 0.0
+    euler = rate[:-1] + 0.01 * (moment[:-1] - turning) @ np.linalg.inv(INERTIA)
+    error = predictor.error(INERTIA[np.triu_indices(3)])
+    assert error == pytest.approx(rate[1:] - euler, abs=1e-12)
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+def test_what_no_sample_tells_is_a_result_and_no_defect(search):
+    still = np.zeros((50, 3))
+    fit = fit_euler_predictor(still, still, 0.01, GUESS, search=search)
+    assert fit.inertia == pytest.approx(GUESS)
 
 
 def test_regularised_search_leaves_unexcited_elements_at_their_guess():

@@ -7,7 +7,8 @@ import pytest
 
 from rig_identification.model import layout
 from rig_identification.thesis import load_case
-from rig_identification.thesis.estimators import SEARCHES, fit_euler_predictor, fit_momentum
+from rig_identification.thesis.estimators import fit_euler_predictor, fit_momentum
+from rig_identification.thesis.predictor import SEARCHES
 from rig_identification.thesis_rerun.comparison import measured, signed_error, worst_percent
 from rig_identification.thesis_rerun.integration import check_integration, integrate
 from rig_identification.thesis_rerun.motion import STEP, fly_case
@@ -122,6 +123,7 @@ def test_map_of_case_5(case_1):
     spread = few.output_error_std[:, 0, 0]
     assert spread[-1] > 10.0 * spread[0]
     assert np.all(np.diff(few.output_error_std[:, 2, 2]) > -1e-9)  # fewer samples never tell more
+    assert few.statement(case_1.case.inertia).startswith(f"Of {WINDOWS // 30} windows")
 
 
 @pytest.mark.parametrize("number", [7, 8])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rig_identification.errors import InputError
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
-from rig_identification.estimate.evidence import Run, prepare
+from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
 from rig_identification.estimate.first_guess import first_elements, mocap_mount, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
@@ -62,8 +62,8 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     elements = first_elements(session)
     model = rig_model(rig, elements)
     model = model if assumed is None else assumed(model)
-    runs = tuple(part for r in session.training for part in prepare(rig, r).where_driven())
-    held = tuple(part for r in session.holdouts for part in prepare(rig, r).where_driven())
+    runs = tuple(away_from_jumps(part) for r in session.training for part in prepare(rig, r).where_driven())
+    held = tuple(away_from_jumps(part) for r in session.holdouts for part in prepare(rig, r).where_driven())
     rests = tuple(prepare_rest(rig, recording) for recording in session.statics)
     channels = {c.device for run in (*runs, *held) for c in run.channels}
     channels |= {c.device for evidence in rests for c in evidence.channels}

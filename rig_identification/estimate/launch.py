@@ -13,7 +13,7 @@ from rig_identification.estimate.momentum import balance, regress
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.rest_evidence import coarsened
-from rig_identification.estimate.solve import Point, Problem, solve
+from rig_identification.estimate.solve import HOPELESS, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
 from rig_identification.model import layout, sensors
@@ -85,8 +85,9 @@ def tracked(bench: Bench, run: Run, theta: Array, rest: State) -> Track | None:
     return track(bench, run, theta, start, start_covariance(0.02, 0.05), noise, DOUBTED)
 
 
-#: Horizons (s) over which a start state is found, a random wrench standing for what is not known.
-LAUNCHES = (0.2, 0.5, 1.0)
+#: Horizons (s) over which a start state is found, a random wrench standing for what is not known; and those
+#: that go before them where the body was let go so far from rest that the first leads astray.
+LAUNCHES, CLOSER = (0.2, 0.5, 1.0), (0.05, 0.1)
 #: How far rig and devices may be off while nothing is known, in tolerances: what is still ordinary.
 DOUBTED = 3.0
 
@@ -96,14 +97,26 @@ def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array
 
     noise (6, 6): random wrench, given where nothing is known yet; rig and devices are then doubted too.
     """
-    length = float(np.mean([cable.length for cable in bench.rig.cables]))
     start = rest
     if bench.mocap is not None:
         first = bench.parameters.places.mocap
         errors = bench.parameters.device(theta)[first : first + sensors.MOCAP_SIZE]
         seen = start_from_mocap(model_at(bench.parameters, theta), run, bench.mocap, errors)
         start = rest if seen is None else seen
-    for end in LAUNCHES:
+    state, square = _launched(bench, run, theta, start, noise, LAUNCHES)
+    if square > HOPELESS:
+        closer = _launched(bench, run, theta, start, noise, CLOSER + LAUNCHES)
+        state = closer[0] if closer[1] < square else state
+    return state
+
+
+def _launched(
+    bench: Bench, run: Run, theta: Array, start: State, noise: Array | None, horizons: tuple[float, ...]
+) -> tuple[State, float]:
+    """Start state by growing horizons, and the mean square that its last fit leaves (none: infinite)."""
+    length = float(np.mean([cable.length for cable in bench.rig.cables]))
+    square = np.inf
+    for end in horizons:
         found = fit_start(
             bench,
             run.until(end),
@@ -115,5 +128,6 @@ def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array
             doubted=0.0 if noise is None else DOUBTED,
         )
         if found is not None:
+            square = float(np.mean(found[0].residual ** 2)) if found[0].residual.size else 0.0
             start = found[1]
-    return start
+    return start, square

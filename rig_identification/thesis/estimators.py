@@ -30,11 +30,10 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
 from rig_identification.errors import InputError
-from rig_identification.thesis.predictor import ELEMENTS, EulerPredictor, search_minimum, tensor
+from rig_identification.thesis.predictor import ELEMENTS, SEARCHES, EulerPredictor, tensor
 
 Array = NDArray[np.float64]
 
-SEARCHES = ("gauss_newton", "levenberg_marquardt", "regularized_gauss_newton")
 CRITERIA = ("sum", "determinant")
 
 
@@ -77,22 +76,9 @@ def fit_euler_predictor(
     parameters = np.einsum("kij,ij->k", ELEMENTS, initial_inertia) / np.einsum(
         "kij,kij->k", ELEMENTS, ELEMENTS
     )
-    weight = np.eye(3)
-    converged, iterations = False, 0
-    # Minimising the determinant equals weighting by the errors' inverse covariance, again and again.
-    for _ in range(1 if criterion == "sum" else 20):
-        before = parameters
-        parameters, converged, used = search_minimum(predictor, parameters, weight, search, eigenvalue_limit)
-        iterations += used
-        error = predictor.error(parameters)
-        if error is None or not converged or criterion == "sum":
-            break
-        covariance = error.T @ error / len(error)
-        if np.linalg.cond(covariance) > 1e12:
-            break  # an axis without error: its determinant has no minimum
-        weight = np.linalg.inv(covariance)
-        if np.abs(parameters - before).max() <= 1e-9 * np.abs(parameters).max():
-            break
+    parameters, converged, iterations = predictor.minimise(
+        parameters, search, eigenvalue_limit, criterion == "determinant"
+    )
     return _fit(predictor, parameters, converged, iterations, criterion)
 
 

@@ -40,7 +40,10 @@ def rerun_document(found: Rerun, seconds: float) -> dict[str, Any]:
             "published_error": s.published - s.actual,
             "found": s.found,
             "found_error": s.found - s.actual,
+            "poses": list(s.poses),
+            "statement": s.statement,
             "std": s.std,
+            "std_of_inclinometer_alone": s.std_inclinometer,
             "std_with_tensions": s.std_with_tensions,
         }
     if found.tracking is not None:
@@ -77,11 +80,20 @@ def _case(result: CaseResult) -> dict[str, Any]:
             name: {"inertia": fit.inertia, "converged": fit.converged, "iterations": fit.iterations}
             for name, fit in comparison.thesis.items()
         },
+        "searches_apart": comparison.searches_apart,
         "output_error": {
             "converged": comparison.output_error.converged,
             "begun_from": comparison.output_error.begun,
             "seconds": comparison.output_error.seconds,
             "worst_percent": worst_percent(case, comparison.output_error.inertia),
+            "guess_times": {
+                f"{factor:g}": {
+                    "converged": fit.converged,
+                    "begun_from": fit.begun,
+                    "worst_percent": worst_percent(case, fit.inertia),
+                }
+                for factor, fit in comparison.far_off.items()
+            },
         },
         "errors": {
             row.key: dict(zip(ELEMENTS, row.values, strict=False)) or None for row in case_rows(result)

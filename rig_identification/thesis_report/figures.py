@@ -23,6 +23,15 @@ STYLE = (
 HEIGHT = 84  # px of one panel
 STYLES = {"a": "residual", "d": "predicted"}
 FLOOR = 1e-6  # percent below which an error is not drawn
+LINE = 17  # px of a line of text below a drawing that stands alone
+
+#: What the colours are, by how a caption begins; any other is one of the case's motion.
+KEYS = {
+    "error of the integrated": "without sensor noise (blue), with it (red)",
+    "error by start": "of (a) (red) and (d) (blue); σ of (d) under sensor noise (grey)",
+    "estimated force": "as applied (grey) and as estimated (blue)",
+    "": "measured (grey), as the tensor of (a) predicts it (red), as that of (d) does (blue)",
+}
 
 
 @dataclass(frozen=True)
@@ -44,18 +53,30 @@ def case_figures(found: Rerun) -> Figures:
             drawings.append(("error by start of the window", _map_svg(result)))
         if result.unknown_force is not None:
             drawings.append(("estimated force", _force_svg(result)))
-        by_case[label] = tuple(drawings)
+        by_case[label] = tuple((f"{caption}: {_key(caption)}", svg) for caption, svg in drawings)
         for k, (caption, svg) in enumerate(drawings, start=1):
             name = (
                 f"case_{label.rjust(2 + len(result.case.variant), '0')}_{k}_{caption.replace(' ', '_')}.svg"
             )
-            files[name] = _alone(svg)
+            files[name] = _alone(svg, f"Case {label}, {caption}", _key(caption))
     return Figures(by_case, files)
 
 
-def _alone(svg: str) -> str:
+def _key(caption: str) -> str:
+    return next(key for begin, key in KEYS.items() if caption.startswith(begin))
+
+
+def _alone(svg: str, title: str, key: str) -> str:
+    """A drawing as a file of its own, with what it shows written below."""
     head, _, rest = svg.partition(">")
-    return f'{head} xmlns="http://www.w3.org/2000/svg">{STYLE}{rest}\n'
+    width, height = (int(number) for number in head.split('viewBox="0 0 ')[1].split('"')[0].split())
+    head = head.replace(f'"0 0 {width} {height}"', f'"0 0 {width} {height + 2 * LINE + 6}"')
+    told = "".join(
+        f'<text x="{width // 2}" y="{height + (k + 1) * LINE}" class="mid">{text}</text>'
+        for k, text in enumerate((title, key))
+    )
+    body = rest.removesuffix("</svg>")
+    return f'{head} xmlns="http://www.w3.org/2000/svg">{STYLE}{body}{told}</svg>\n'
 
 
 def _trace_svg(label: str, trace: Trace) -> str:

@@ -11,6 +11,7 @@ from rig_identification import __version__
 from rig_identification.thesis import read_text_remarks
 from rig_identification.thesis_report.figures import Figures
 from rig_identification.thesis_report.sections import add_sections
+from rig_identification.thesis_report.summary import grouped_modes, summary
 from rig_identification.thesis_report.table import ELEMENTS, absolute_elements, case_rows, number
 from rig_identification.thesis_rerun import Rerun
 
@@ -36,6 +37,10 @@ def write_page(found: Rerun, figures: Figures, seconds: float, path: Path) -> No
             label: [(caption, Markup(svg)) for caption, svg in drawn]
             for label, drawn in figures.by_case.items()
         },
+        summary=summary(found),
+        swings=grouped_modes(found.cases),
+        searches_apart=max((r.comparison.searches_apart for r in found.cases), default=None),
+        chapter_2=found.statics is not None,
         tracking=found.tracking,
         examination=found.examination,
         remarks=read_text_remarks(),

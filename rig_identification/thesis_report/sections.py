@@ -12,11 +12,15 @@ BEFORE = '<h2 id="table">'
 _STATICS = """
 <h2 id="statics">Centre of mass from two hanging poses (Table 2.1)</h2>
 <p>Inclinations, cable lengths and masses alone, bare and with the dummy, in the table's axes (z down).
-σ is with an inclinometer's mean to 10 µrad and a rig measured to ordinary tolerances, and with load
-cells to 0.5 N beside it.</p>
+{{ s.statement }} Poses in which it can hang: {{ s.poses[0] }} bare, {{ s.poses[1] }} with the dummy. Where
+readings fit several centres of mass the solver names each, and where none it says so.
+σ is with an inclinometer's mean to 10 µrad on a rig as described, on one measured to ordinary tolerances, and
+there with load cells to 0.5 N beside it: what is not the inclinometer's are lengths and hinges, and tensions
+take most of that away.</p>
 <div class="scroll"><table class="fit">
 <tr><th>mm</th><th class="n">actual</th><th class="n">thesis, published</th><th class="n">its error</th>
-<th class="n">found here</th><th class="n">error</th><th class="n">σ</th>
+<th class="n">found here</th><th class="n">error</th>
+<th class="n">σ, inclinometer alone</th><th class="n">σ</th>
 <th class="n">σ with tensions</th></tr>
 {% for axis in "xyz" %}{% set k = loop.index0 %}
 <tr><td>{{ axis }}</td><td class="n">{{ "%.3f" | format(1000 * s.actual[k]) }}</td>
@@ -24,6 +28,7 @@ cells to 0.5 N beside it.</p>
 <td class="n">{{ "%.3f" | format(1000 * (s.published[k] - s.actual[k])) }}</td>
 <td class="n">{{ "%.3f" | format(1000 * s.found[k]) }}</td>
 <td class="n">{{ "%.0e" | format(1000 * (s.found[k] - s.actual[k])) }}</td>
+<td class="n">{{ "%.2f" | format(1000 * s.std_inclinometer[k]) }}</td>
 <td class="n">{{ "%.1f" | format(1000 * s.std[k]) }}</td>
 <td class="n">{{ "%.1f" | format(1000 * s.std_with_tensions[k]) }}</td></tr>
 {% endfor %}

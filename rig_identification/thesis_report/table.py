@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.thesis_rerun import CaseResult, Rerun, signed_error
+from rig_identification.thesis_rerun import (
+    GIVEN_BACK,
+    CaseResult,
+    Rerun,
+    points_apart,
+    signed_error,
+    worst_percent,
+)
 
 Array = NDArray[np.float64]
 
@@ -50,11 +57,10 @@ def case_rows(result: CaseResult) -> tuple[Row, ...]:
     published = case.published
     rows = [
         Row("published", () if published is None else _six(published.error), _why_none(result)),
-        *(Row(key, _six(signed_error(case, tensors[key]))) for key in "abc"),
+        Row("a", _six(signed_error(case, tensors["a"])), _why_apart(result)),
+        *(Row(key, _six(signed_error(case, tensors[key]))) for key in "bc"),
+        Row("d", _six(signed_error(case, tensors["d"])), _from_where(result)),
     ]
-    fit = result.comparison.output_error
-    note = "" if fit.converged else "did not converge"
-    rows.append(Row("d", _six(signed_error(case, fit.inertia)), note))
     if result.unknown_force is not None:
         unknown = result.unknown_force
         text = f"force to {unknown.force_rms:.1f} N rms"
@@ -76,6 +82,33 @@ def _why_none(result: CaseResult) -> str:
         6: "not identified in the thesis",
         7: "not identified in the thesis",
     }.get(result.case.number, "none printed")
+
+
+def _why_apart(result: CaseResult) -> str:
+    """How far (a) is from what the thesis publishes of it."""
+    apart = points_apart(result.case, result.comparison)
+    if apart is None:
+        return ""
+    if apart <= GIVEN_BACK:
+        return f"given back within {apart:.2f} points"
+    return f"{apart:.2g} points off, see the case"
+
+
+def _from_where(result: CaseResult) -> str:
+    """From which guesses (d) came where."""
+    comparison = result.comparison
+    fits = {1.0: comparison.output_error, **comparison.far_off}
+    lost = [f"{factor:g}" for factor, fit in fits.items() if not fit.converged]
+    if lost:
+        return f"did not converge from guess × {', '.join(lost)}"
+    times = ", ".join(f"{factor:g}" for factor in sorted(fits))
+    return f"{worst_of_guesses(result):.1g} % at most, guess × {times}"
+
+
+def worst_of_guesses(result: CaseResult) -> float:
+    """Largest error of (d), percent, from any of the first guesses."""
+    fits = (result.comparison.output_error, *result.comparison.far_off.values())
+    return max(worst_percent(result.case, fit.inertia) for fit in fits)
 
 
 def _six(matrix: Array) -> tuple[float, ...]:

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.live.generalized_wrench import generalized_wrench
 from rig_identification.thesis.case import Case
-from rig_identification.thesis.estimators import SEARCHES, InertiaFit, fit_euler_predictor, fit_momentum
+from rig_identification.thesis.estimators import InertiaFit, fit_euler_predictor, fit_momentum
+from rig_identification.thesis.predictor import SEARCHES
 from rig_identification.thesis_rerun.motion import CaseMotion
 from rig_identification.thesis_rerun.output_error import TensorFit, fit_tensor
 
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: Motion that (d) is fitted to, s; (a) to (c) see the thesis' whole window.
 FITTED = 20.0
+#: Factors on the thesis' initial guess from which (d) is run as well.
+FAR_OFF = (0.2, 5.0)
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,13 @@ class Comparison:
     gyroscopic: InertiaFit  # (b)
     momentum: InertiaFit  # (c)
     output_error: TensorFit  # (d)
+    far_off: dict[float, TensorFit]  # (d) by factor on the guess
+
+    @property
+    def searches_apart(self) -> float:
+        """kg m^2 by which the searches of (a) differ at most."""
+        found = np.array([fit.inertia for fit in self.thesis.values()])
+        return float(np.max(np.ptp(found, axis=0)))
 
     @property
     def tensors(self) -> dict[str, Array]:
@@ -60,11 +70,14 @@ def compare(motion: CaseMotion) -> Comparison:
     guess = case.initial_guess
     thesis = {s: fit_euler_predictor(rate, moment, case.sampling, guess, search=s) for s in SEARCHES}
     momentum = fit_momentum(rate, moment, case.sampling)
+    window = fitted_window(case)
+    near, *far = (fit_tensor(motion, window, f * guess, momentum.inertia) for f in (1.0, *FAR_OFF))
     return Comparison(
         thesis,
         fit_euler_predictor(rate, moment, case.sampling, guess, gyroscopic=True),
         momentum,
-        fit_tensor(motion, fitted_window(case), guess, momentum.inertia),
+        near,
+        dict(zip(FAR_OFF, far, strict=True)),
     )
 
 

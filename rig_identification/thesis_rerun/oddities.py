@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.thesis.case import Case
 from rig_identification.thesis.tables import read_case_table
 from rig_identification.thesis_rerun.comparison import Comparison, signed_error
 from rig_identification.thesis_rerun.motion import STEP, CaseMotion
@@ -34,16 +35,23 @@ def odd_statements(motion: CaseMotion, comparison: Comparison) -> tuple[str, ...
 def given_back(motion: CaseMotion, comparison: Comparison) -> str | None:
     """How close (a) comes to the published errors; None where none are published."""
     case = motion.case
-    if case.published is None:
+    apart = points_apart(case, comparison)
+    if apart is None:
         return None
-    ours = np.abs(signed_error(case, comparison.tensors["a"]))
-    apart = np.abs(np.diag(ours - case.published.error))
-    if np.max(apart) <= GIVEN_BACK:
-        return f"(a) gives the published diagonal errors back within {np.max(apart):.2f} percentage points."
-    miss = f"(a) misses the published diagonal errors by up to {np.max(apart):.2f} percentage points."
+    if apart <= GIVEN_BACK:
+        return f"(a) gives the published diagonal errors back within {apart:.2f} percentage points."
+    miss = f"(a) misses the published diagonal errors by up to {apart:.2f} percentage points."
     readings = try_readings(motion)
     parts = [miss, REASONS.get(case.number, ""), "" if readings is None else _told(readings)]
     return " ".join(part for part in parts if part)
+
+
+def points_apart(case: Case, comparison: Comparison) -> float | None:
+    """Percentage points between the diagonal errors of (a) and the published ones; None: none published."""
+    if case.published is None:
+        return None
+    ours = np.abs(signed_error(case, comparison.tensors["a"]))
+    return float(np.max(np.abs(np.diag(ours - case.published.error))))
 
 
 def _told(readings: Readings) -> str:

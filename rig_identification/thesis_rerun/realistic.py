@@ -4,11 +4,6 @@ A session of the case is simulated with the noise of good industrial sensors and
 not quite as described, and the estimator's whole problem, every doubt about the rig among its
 unknowns, is linearised at the truth. Its inverse information is the covariance that the fit
 ends with; one Gauss-Newton step from the truth is the estimate to first order in the noise.
-
-Around a jump of the exciter's force samples are left out. The force is known by samples 2 ms apart
-and a line between nodes: through a jump that line overshoots by a sixth for two nodes either way, and
-load cells and accelerometers feel it at once. In case 7, three jumps of 300 N along all axes on the
-lightest body, the samples there are off by up to 50 sigma and carry Jxy 6 sigma away.
 """
 
 from __future__ import annotations
@@ -18,13 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import rest_of
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.observability import elements_covariance
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import drive, model_at
-from rig_identification.estimate.sampling import group_by_node
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.model.body import tensor
 from rig_identification.model.motion import simulate
@@ -33,9 +26,6 @@ from rig_identification.thesis.case import Case
 from rig_identification.thesis_rerun.comparison import fitted_window
 
 Array = NDArray[np.float64]
-
-#: Node intervals either way of a jump of force from which samples are left out.
-BESIDE_JUMP = 3.0
 
 
 @dataclass(frozen=True)
@@ -54,7 +44,6 @@ def realistic_uncertainty(case: Case, seed: int) -> Realistic | None:
     spec = case_spec(case, duration=last, holdout=False, rods=True)
     session, truth = simulate_session(spec, np.random.default_rng(seed))
     problem, _, _ = pose_problem(session)
-    problem = replace(problem, runs=tuple(away_from_jumps(run) for run in problem.runs))
     evaluation = _at_truth(problem, truth, first)
     if evaluation is None:
         return None
@@ -63,22 +52,6 @@ def realistic_uncertainty(case: Case, seed: int) -> Realistic | None:
     change = problem.bench.parameters.elements_jacobian(evaluation.point.theta) @ step
     std = np.sqrt(np.diag(covariance))
     return Realistic(tensor(std[4:]), tensor((change / std)[4:]), std[1:4], last - first)
-
-
-def away_from_jumps(run: Run) -> Run:
-    """The run without samples beside a jump of its exciter's force."""
-    if run.force is None:
-        return run
-    step = run.grid.step
-    found = np.flatnonzero(np.any(run.force.jumps != 0.0, axis=1))
-    middles = step * (found[:, None] + 0.5)
-    channels = []
-    for channel in run.channels:
-        kept = np.all(np.abs(channel.time - middles) > BESIDE_JUMP * step, axis=0)
-        time = channel.time[kept]
-        group, node = group_by_node(run.grid, time)
-        channels.append(replace(channel, time=time, values=channel.values[kept], group=group, node=node))
-    return replace(run, channels=tuple(channels))
 
 
 def _at_truth(problem: Problem, truth: Truth, begin: float) -> Evaluation | None:

@@ -95,7 +95,8 @@ def rerun_case(case: Case) -> CaseResult:
     windows = convergence_map(motion, comparison.momentum.inertia) if case.number == MAPPED else None
     realistic = realistic_uncertainty(case, SEED)
     integration = check_integration(motion, SEED) if case.number == CHECKED else None
-    told = () if integration is None else (integration.statement,)
+    told = [] if integration is None else [integration.statement]
+    told += [] if windows is None else [windows.statement(case.inertia)]
     return CaseResult(
         case,
         motion.least_tension,
@@ -107,7 +108,7 @@ def rerun_case(case: Case) -> CaseResult:
         integration,
         modes_of(case),
         _traces(motion, comparison),
-        told + odd_statements(motion, comparison),
+        (*told, *odd_statements(motion, comparison)),
     )
 
 
@@ -125,9 +126,10 @@ def rerun(cases: tuple[Case, ...], progress: Progress, workers: int = 2, trackin
     """
     statics = rerun_statics() if tracking else None
     jobs = [(case.number, case.variant) for case in cases]
-    beside = [TRACKERS] * tracking + [PATIENT] * any(case.number == EXAMINED for case in cases)
+    beside = [PATIENT] * any(case.number == EXAMINED for case in cases) + [TRACKERS] * tracking
     # The long ones first, so that no process ends up alone with one of them
-    order = [*beside, *sorted(jobs, key=lambda job: job[0] not in (3, 4, MAPPED))]
+    longest = sorted(cases, key=lambda case: -case.duration)
+    order = [*beside, *((case.number, case.variant) for case in longest)]
     alone = workers < 2 or len(order) < 2
     found: dict[Job, Any] = dict(
         _in_turn(order, progress) if alone else _side_by_side(order, workers, progress)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.recording import Dummy
 from rig_identification.statics import (
+    Equilibrium,
     StaticSolution,
     find_equilibria,
     observe_equilibrium,
@@ -29,7 +31,10 @@ class StaticRerun:
     actual: Array  # (3,) printed
     published: Array  # (3,) what the thesis calculates
     found: Array  # (3,) without noise, nothing given but inclinations, lengths and masses
+    poses: tuple[int, ...]  # in which the bare body, and the one with its dummy, can hang
+    statement: str  # the solver's, on the poses and the centre of mass that explain the readings
     std: Array  # (3,) with a real inclinometer and a rig to ordinary tolerances
+    std_inclinometer: Array  # (3,) with the same inclinometer on a rig as described
     std_with_tensions: Array  # (3,) load cells beside it
 
     @property
@@ -41,21 +46,32 @@ class StaticRerun:
 def rerun_statics() -> StaticRerun:
     """Hang the body of Table 2.1 bare and with its dummy, and solve for its centre of mass."""
     case = load_static_case()
-    found, _ = _body(case, _solved(case, 0.0, None))
-    _, std = _body(case, _solved(case, INCLINATION, None))
-    _, sharper = _body(case, _solved(case, INCLINATION, TENSION))
-    return StaticRerun(case.actual, case.calculated, found @ TURN, std, sharper)
+    exact = replace(case, rig=replace(case.rig, tolerance=dict.fromkeys(case.rig.tolerance, 0.0)))
+    ideal = _solved(case, 0.0, None)
+    found, _ = _body(case, ideal)
+    std, by_inclinometer, sharper = (
+        _body(which, _solved(which, INCLINATION, tension))[1]
+        for which, tension in ((case, None), (exact, None), (case, TENSION))
+    )
+    poses = tuple(len(_hung(case, dummy)) for dummy in (None, case.dummy))
+    return StaticRerun(
+        case.actual, case.calculated, found @ TURN, poses, ideal.statement, std, by_inclinometer, sharper
+    )
+
+
+def _hung(case: StaticCase, dummy: Dummy | None) -> tuple[Equilibrium, ...]:
+    """Every pose in which the body hangs."""
+    if case.rig.mass is None:
+        raise AssertionError("the table prints the masses")
+    return find_equilibria(case.rig, case.rig.mass, case.combined, dummy).equilibria
 
 
 def _solved(case: StaticCase, inclination: float, tension: float | None) -> StaticSolution:
-    rig, mass = case.rig, case.rig.mass
-    if mass is None:
-        raise AssertionError("the table prints the masses")
     seen = []
     for name, dummy in (("bare", None), ("dummy", case.dummy)):
-        rest = find_equilibria(rig, mass, case.combined, dummy).equilibria[0]
-        seen.append(observe_equilibrium(rig, rest, name, dummy, inclination, tension))
-    return solve_center_of_mass(rig, *seen)
+        rest = _hung(case, dummy)[0]
+        seen.append(observe_equilibrium(case.rig, rest, name, dummy, inclination, tension))
+    return solve_center_of_mass(case.rig, *seen)
 
 
 def _body(case: StaticCase, solution: StaticSolution) -> tuple[Array, Array]:

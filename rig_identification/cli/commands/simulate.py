@@ -20,8 +20,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig_identification.cli.cases import case_named
 from rig_identification.cli.effects import effects_given
 from rig_identification.cli.simulated import write_simulated
+from rig_identification.cli.swings import swing_line, swings
 from rig_identification.errors import InputError
 from rig_identification.result import ELEMENTS
 
@@ -118,19 +120,9 @@ def run(arguments: argparse.Namespace) -> None:
         if least <= 0.0:
             what = "is pushed" if arguments.rods else "goes slack"
             print(f"note: a cable {what} in {name}; pull or shake less where the ideal model is to hold")
-    for line in _modes(spec):
-        print(line)
+    for mode in swings(spec.rig, spec.elements):
+        print(swing_line(mode))
     print(f"session: {arguments.out}")
-
-
-def _modes(spec: SessionSpec) -> list[str]:
-    """How the body swings by itself on the rig as described."""
-    from rig_identification.model.modes import natural_modes
-    from rig_identification.model.motion import rig_model
-    from rig_identification.simulate.start import rest_state
-
-    model = rig_model(spec.rig, spec.elements, rods=spec.rods)
-    return [f"swings at {m.frequency:.3f} Hz: {m.shape}" for m in natural_modes(model, rest_state(model))]
 
 
 def specification(arguments: argparse.Namespace) -> SessionSpec:
@@ -159,15 +151,10 @@ def specification(arguments: argparse.Namespace) -> SessionSpec:
 
 def _of_case(arguments: argparse.Namespace) -> SessionSpec:
     from rig_identification.simulate import case_spec
-    from rig_identification.thesis import load_case
 
     if arguments.body is not None:
         raise InputError("--body: a case study has its own body; leave it out, or give --rig")
-    number, variant = arguments.case.rstrip("abcd"), arguments.case.lstrip("0123456789")
-    if not number.isdecimal():
-        raise InputError(f"--case {arguments.case}: is no case study; give 1 to 17, or 18a to 18d")
-    case = load_case(int(number), variant)
-    return case_spec(case, duration=arguments.duration, rest=arguments.rest)
+    return case_spec(case_named(arguments.case), duration=arguments.duration, rest=arguments.rest)
 
 
 def _of_rig(arguments: argparse.Namespace) -> SessionSpec:
