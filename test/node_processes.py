@@ -160,7 +160,7 @@ class Graph:
         process.send_signal(number)
         self.processes.remove(process)
         output, hung = _end_of(process, within)
-        assert not hung, f"{process.args} did not end within {within} s:\n{output}"
+        assert not hung, f"{process.args!r} did not end within {within} s:\n{output}"
         return process.returncode, output
 
     def close(self) -> None:
@@ -172,7 +172,7 @@ class Graph:
             process.terminate()
         ends = [(process.args, *_end_of(process, 60.0)) for process in self.processes]
         self.processes.clear()
-        stuck = [f"{arguments} did not end:\n{output}" for arguments, output, hung in ends if hung]
+        stuck = [f"{arguments!r} did not end:\n{output}" for arguments, output, hung in ends if hung]
         assert not stuck, "\n".join(stuck)
 
 
@@ -217,11 +217,19 @@ class Probe:
         while time.monotonic() < end:
             self.executor.spin_once(timeout_sec=0.05)
 
-    def listen(self, kind: Any, topic: str, qos: Any = 1000) -> list[Any]:
-        """List that a topic's messages are appended to."""
+    def listen(self, kind: Any, topic: str, qos: Any = 1000, raw: bool = False) -> list[Any]:
+        """List that a topic's messages are appended to; ``raw``: as bytes, for fast topics."""
         heard: list[Any] = []
-        self.node.create_subscription(kind, topic, heard.append, qos)
+        self.node.create_subscription(kind, topic, heard.append, qos, raw=raw)
         return heard
+
+    def hear_once(self, kind: Any, topic: str, within: float = 120.0) -> Any:
+        """One message of a topic that is not listened to any longer."""
+        heard: list[Any] = []
+        subscription = self.node.create_subscription(kind, topic, heard.append, 10)
+        self.spin_until(lambda: heard, within, topic)
+        self.node.destroy_subscription(subscription)
+        return heard[-1]
 
     def begin(self, service: str, within: float = 30.0) -> Any:
         """Future of a Trigger request."""
