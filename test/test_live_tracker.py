@@ -129,7 +129,7 @@ def tracker_and_track(
         tracker.add_inclination(*news["up"])
         for i, cable in enumerate(rig.cables):
             tracker.add_tension(cable.name, news["tension"][0], news["tension"][1][:, i : i + 1])
-        tracker.add_exciter(news["exciter"][1])
+        tracker.add_exciter(*news["exciter"])
         if len(news["imu"][0]):
             out.append(tracker.add_imu(*news["imu"]))
     return tracker, Tracked(*(np.concatenate([getattr(t, f) for t in out]) for f in Tracked.__annotations__))
@@ -270,6 +270,20 @@ def test_without_an_inclinometer_cables_and_imu_hold_the_body(
     flight, streams = shaken
     rig = replace(described(), inclinometer=None)
     judged(flight, track(rig, {**streams, "up": SILENT}, looks(flight))).fair(0.0)
+
+
+def test_forces_that_fell_silent_or_stalled_pull_nowhere(
+    shaken: tuple[Flight, Streams], built: tuple[Rig, np.random.Generator]
+) -> None:
+    """Without an inclinometer the cables' pull counts: an exciter's last word is not its force."""
+    flight, streams = shaken
+    rig = replace(described(), inclinometer=None)
+    stamp, force = streams["exciter"]
+    spoke = stamp < START + 5_000 * MS
+    silent = {**streams, "up": SILENT, "exciter": (stamp[spoke], force[spoke])}
+    judged(flight, track(rig, silent, looks(flight))).fair(0.0)
+    stalls = START + np.cumsum(np.random.default_rng(5).exponential(0.4e9, 100)).astype(np.int64)
+    judged(flight, track(rig, {**streams, "up": SILENT}, stalls)).fair(0.0)
 
 
 def test_the_history_tells_how_the_body_turned_and_what_a_hole_hides() -> None:

@@ -89,7 +89,7 @@ class BodyTracker:
         self._inclinations: deque[tuple[int, Array]] = deque(maxlen=200)
         self._tension = np.full(len(rig.cables), np.nan)
         self._tension_ns = np.zeros(len(rig.cables), np.int64)
-        self._applied = np.zeros(3)
+        self._applied, self._applied_ns = np.zeros(3), 0  # 0: there is no exciter that measures
         self._names = [cable.name for cable in rig.cables]
         self._history = ImuHistory()
         self._cables = Trust(2 * len(rig.cables))
@@ -122,15 +122,18 @@ class BodyTracker:
         self._inclinations.extend(zip(stamp_ns.tolist(), np.sin(values), strict=True))
 
     def add_tension(self, cable: str, stamp_ns: Stamps, values: Array) -> None:
-        """(n, 1) N; the mean of a batch stands for it."""
+        """(n, 1) N; the mean of a batch's last moment stands for it: batches grow on a busy machine."""
         if len(stamp_ns):
             i = self._names.index(cable)
-            self._tension[i], self._tension_ns[i] = float(np.mean(values)), stamp_ns[-1]
+            self._tension[i], self._tension_ns[i] = _latest(stamp_ns, values)[0], stamp_ns[-1]
 
-    def add_exciter(self, values: Array) -> None:
+    def add_exciter(self, stamp_ns: Stamps, values: Array) -> None:
         """(n, 3) N, exciter frame."""
-        if len(values):
-            self._applied = self._turn_exciter @ np.mean(values, axis=0)
+        if len(stamp_ns):
+            self._applied, self._applied_ns = (
+                self._turn_exciter @ _latest(stamp_ns, values),
+                int(stamp_ns[-1]),
+            )
 
     def add_imu(self, stamp_ns: Stamps, values: Array) -> Tracked:
         """Advance through samples (n, 6) with ascending stamps; returns the body at each."""
@@ -194,16 +197,19 @@ class BodyTracker:
             measured_ns, sines = self._inclinations.popleft()
             if measured_ns >= max(self._unbroken_ns, stamp_ns - round(1e9 * LATEST)):
                 self._believe(self._level, measured_ns, self._inclination_update(measured_ns, sines))
-        fresh = np.all(np.abs(self._tension_ns - stamp_ns) < 1e9 * APART) and np.all(
-            np.isfinite(self._tension)
-        )
-        if stamp_ns >= self._pull_due and fresh:
+        if stamp_ns >= self._pull_due and self._knows_forces(stamp_ns):
             self._pull_due = stamp_ns + round(1e9 * PULL_PERIOD)
             w = rate - self._bias[:3]
             at_center = force + np.cross(w, np.cross(w, self._center))
             strapdown.update_pull(
                 *state, at_center, self._tension, self._applied, self._ceiling, self._arms, PULL_STD
             )
+
+    def _knows_forces(self, stamp_ns: int) -> bool:
+        """Whether all that pulls was measured just now; a silent exciter leaves its force unknown."""
+        stamps = self._tension_ns if self._applied_ns == 0 else np.append(self._tension_ns, self._applied_ns)
+        known = np.all(np.isfinite(self._tension)) and np.all(np.abs(stamps - stamp_ns) < 1e9 * APART)
+        return bool(known)
 
     def _cable_update(self, stamp_ns: int, rate: Array) -> Callable[[float], float]:
         left = max(0.0, 1.0 - (stamp_ns - self._begun_ns) / (1e9 * SETTLING))
@@ -256,3 +262,9 @@ class BodyTracker:
                 return
         self.restarts += 1
         self._begin(self._last_ns)
+
+
+def _latest(stamp_ns: Stamps, values: Array) -> Array:
+    """(w,) mean of the samples of the last :data:`PULL_PERIOD`."""
+    first = int(np.searchsorted(stamp_ns, stamp_ns[-1] - round(1e9 * PULL_PERIOD)))
+    return np.asarray(np.mean(values[first:], axis=0))

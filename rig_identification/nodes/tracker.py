@@ -71,7 +71,7 @@ class TrackerNode(RigNode):
             elif channel == "inclination":
                 self.tracker.add_inclination(batch.stamp_ns, batch.values)
             elif channel == "exciter_force":
-                self.tracker.add_exciter(batch.values)
+                self.tracker.add_exciter(batch.stamp_ns, batch.values)
             elif batch.topic.cable is not None and len(batch.values):
                 self.tracker.add_tension(batch.topic.cable, batch.stamp_ns, batch.values)
                 self._tension[batch.topic.cable] = float(batch.values[-1, 0])
