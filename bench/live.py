@@ -41,7 +41,7 @@ class Watcher(Node):
     def __init__(self) -> None:
         super().__init__("bench", namespace="/rig")
         self.latency: list[tuple[float, float]] = []
-        self.restarts = "0"
+        self.restarts = self.surprises = "0"
         self.tracked, self.late = 0, 0  # IMU samples since the tracker's start, and those tracked late
         self.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 50)
 
@@ -51,7 +51,7 @@ class Watcher(Node):
                 values = {pair.key: pair.value for pair in line.values}
                 if "latency_p99_ms" in values:
                     self.latency.append((float(values["latency_p50_ms"]), float(values["latency_p99_ms"])))
-                    self.restarts = values["restarts"]
+                    self.restarts, self.surprises = values["restarts"], values["surprises"]
                     self.tracked, self.late = int(values["tracked"]), int(values["late"])
 
     def call(self, service: str) -> str:
@@ -185,7 +185,8 @@ def measure(folder: Path, processes: dict[str, subprocess.Popen[bytes]], minutes
     share = late / max(tracked, 1)
     print(f"tracker latency: {late} of {tracked} samples ({100.0 * share:.2f} %) later than 20 ms; over 20 s")
     print(f"each, the median is {np.median(p50):.2f} ms, the 99th percentile mostly {np.median(p99):.2f} ms,")
-    print(f"{np.max(p99):.2f} ms at worst; {watcher.restarts} restarts; load {os.getloadavg()[0]:.1f}")
+    print(f"{np.max(p99):.2f} ms at worst; {watcher.restarts} restarts, {watcher.surprises} surprises;")
+    print(f"load {os.getloadavg()[0]:.1f}")
     if slow:
         print("the simulated rig did not keep pace: the load was less than asked for")
     return int(misses > 0 or share > LATE_LIMIT or slow or tracked == 0 or any(endings.values()))

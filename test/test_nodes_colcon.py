@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
 
-from node_processes import ROOT, Graph
+from node_processes import PATIENCE, ROOT, Graph
 
 COLCON = shutil.which("colcon", path=sysconfig.get_path("scripts") + os.pathsep + os.environ.get("PATH", ""))
 NAMES = (
@@ -56,12 +56,12 @@ def test_every_executable_runs_from_the_install_folder(tmp_path: Path) -> None:
             text=True,
         )
         time.sleep(0.2)
-        end = time.monotonic() + 20.0
+        end = time.monotonic() + 20.0 * PATIENCE
         while process.poll() is None and "librcl" not in Path(f"/proc/{process.pid}/maps").read_text():
             assert time.monotonic() < end, f"{name} does not come up"
             time.sleep(0.02)
         if name != "replay":
             process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=60.0)
+        output, _ = process.communicate(timeout=60.0 * PATIENCE)
         expected = (2, "replay: parameter session: is empty; give the folder of a session\n")
         assert (name, process.returncode, output) == (name, *(expected if name == "replay" else (0, "")))

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +17,8 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from node_processes import BODY, SIMULATOR, Graph, Probe
+from node_processes import BODY, Diagnostics, Graph, Probe
+from rclpy.serialization import deserialize_message
 from ruamel.yaml import YAML
 from std_msgs.msg import Float64MultiArray, String
 from visualization_msgs.msg import MarkerArray
@@ -24,6 +28,8 @@ from rig_identification.nodes.rig_node import LATCHED
 from rig_identification.session import read_session
 
 DUMMY = [0.16, 0.2, -0.2]
+#: Nodes that keep data, and how they are told to.
+KEEPERS = {"recorder": ("start", "stop"), "identifier": ("start_window", "stop_window")}
 #: s that a fit with its search for left-out physics may take on a busy machine.
 FIT = 400.0
 
@@ -33,68 +39,122 @@ def ten_of(message: InertiaStamped) -> np.ndarray:
     return np.array([i.m, i.com.x, i.com.y, i.com.z, i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz])
 
 
-def record(probe: Probe, seconds: float, **recording: object) -> None:
-    assert not probe.set("recorder", **{f"recording__{name}": value for name, value in recording.items()})
-    assert probe.call("recorder/start").success
-    probe.spin_for(seconds)
-    answer = probe.call("recorder/stop")
-    assert answer.success, answer.message
+def stamp(message: Odometry) -> float:
+    return float(message.header.stamp.sec % 100_000 + 1e-9 * message.header.stamp.nanosec)
+
+
+def decoded(raw: bytes) -> Odometry:
+    return deserialize_message(raw, Odometry)
+
+
+def record(probe: Probe, truth: list[bytes], seconds: float, **recording: object) -> float:
+    """Record, and keep as a window, so many s by the rig's own clock; returns when it began."""
+    for node, (start, stop) in KEEPERS.items():
+        assert not probe.set(node, **{f"recording__{name}": value for name, value in recording.items()})
+        probe.meet(f"{node}/{stop}")
+        assert probe.call(f"{node}/{start}").success
+    begun = stamp(decoded(truth[-1]))
+    passed = begun + seconds
+    probe.spin_until(lambda: stamp(decoded(truth[-1])) > passed, 10.0 * seconds, f"{seconds} s of motion")
+    for node, (_, stop) in KEEPERS.items():
+        answer = probe.call(f"{node}/{stop}")
+        assert answer.success, answer.message
+    return begun
+
+
+@dataclass(frozen=True)
+class Shift:
+    """What a shift at the simulated rig left behind."""
+
+    session: Path  # that the recorder wrote
+    answers: dict[str, Any]  # of the identifier, by request
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A session that the recorder wrote of the simulated rig; odometry and wrench were watched meanwhile."""
-    folder = tmp_path_factory.mktemp("recorded")
+def shift(tmp_path_factory: pytest.TempPathFactory) -> Shift:
+    """One command brings the rig up; all else is asked for by service, from this process."""
+    folder = tmp_path_factory.mktemp("shift")
     graph = Graph(folder)
+    chosen = (
+        f"recorder.folder={folder / 'session'}", "load_cells.simulation.rate=200.0",
+        "imu.simulation.bias=[0.0, 0.0, 0.0, 0.01, 0.0, -0.01]",
+    )  # fmt: skip
+    command = [sys.executable, "-m", "rig_identification.cli.main", "rig", "simulated"]
+    rig = graph.run(command + [part for one in chosen for part in ("--set", one)])
     try:
-        graph.start("rig_simulator", *SIMULATOR)
-        graph.start("load_cells", "simulation.rate:=200.0")
-        graph.start("imu", "simulation.rate:=200.0", "simulation.bias:=[0.0, 0.0, 0.0, 0.01, 0.0, -0.01]")
-        graph.start("inclinometer", "simulation.rate:=50.0")
-        graph.start("tracker")
-        graph.start("preprocessor")
-        recorder = graph.start("recorder", f"folder:={folder / 'session'}")
         probe = Probe(graph)
-        odometry = probe.listen(Odometry, "odometry")
-        wrench = probe.listen(WrenchStamped, "generalized_wrench")
-        markers = probe.listen(MarkerArray, "markers")
-        truth = probe.listen(Odometry, "ground_truth/odometry")
-        probe.spin_until(lambda: odometry and wrench and markers and truth, 120.0, "the graph")
-        record(probe, 2.0, kind="static")
+        odometry = probe.listen(Odometry, "odometry", 20_000, raw=True)
+        truth = probe.listen(Odometry, "ground_truth/odometry", 20_000, raw=True)
+        probe.spin_until(lambda: odometry and truth, 120.0, "the graph")
+        probe.hear_once(WrenchStamped, "generalized_wrench")
+        assert len(probe.hear_once(MarkerArray, "markers").markers) == 4
+        sensed = (*(f"cable_{i}/wrench" for i in range(1, 5)), "exciter/wrench", "imu/data_raw")
+        diagnostics = Diagnostics(probe)
+        for node in KEEPERS:
+            arrived = diagnostics.arrivals(node, 1, *sensed, "inclinometer/angles")
+            probe.spin_until(arrived, 60.0, f"every device at the {node}")
+        record(probe, truth, 2.0, kind="static")
         probe.set("rig_simulator", dummy__mass=50.0, dummy__position=DUMMY)
         assert probe.call("rig_simulator/come_to_rest").success
-        record(probe, 2.0, kind="static", dummy_mass=50.0, dummy_position=DUMMY)
+        record(probe, truth, 2.0, kind="static", dummy_mass=50.0, dummy_position=DUMMY)
         probe.set("rig_simulator", dummy__mass=0.0)
         probe.call("rig_simulator/come_to_rest")
         probe.call("rig_simulator/shake")
-        record(probe, 8.0, kind="dynamic")
-        check_tracking(odometry[-400:], truth)
-        assert len(markers[-1].markers) == 4
-        assert graph.end(recorder) == (0, "")
+        begun = record(probe, truth, 8.0, kind="dynamic", dummy_mass=0.0)
+        # By the stamps: on a busy machine what is heard is seconds old, each topic's by another time
+        over = begun + 8.1
+        for heard in (odometry, truth):
+            probe.spin_until(lambda heard=heard: stamp(decoded(heard[-1])) > over, 60.0, "all of it")
+        last = [m for m in map(decoded, odometry) if begun + 4.0 < stamp(m) < begun + 8.0]
+        check_tracking(last, [decoded(raw) for raw in truth])
+        answers = {}
+        for request in ("identify_center_of_mass", "identify_inertia", "get_center_of_mass", "get_inertia"):
+            answer = probe.call(f"identifier/{request}", within=FIT)
+            assert answer.success, answer.message
+            answers[request] = json.loads(answer.message)
+        assert graph.end(rig) == (0, "")
         probe.close()
     finally:
         graph.close()
-    return folder / "session"
+    return Shift(folder / "session", answers)
+
+
+@pytest.fixture(scope="module")
+def recorded(shift: Shift) -> Path:
+    """The session that the recorder wrote."""
+    return shift.session
+
+
+def test_the_body_asked_for_by_service_lies_within_its_deviations(shift: Shift) -> None:
+    asked = shift.answers["identify_inertia"]
+    assert asked["recordings"] == ["static_1", "static_2", "run_1"]
+    assert asked["verdict"] == "none"
+    inertia, center = asked["inertia"], shift.answers["identify_center_of_mass"]["center_of_mass"]
+    upper = np.triu_indices(3)
+    off = np.array(inertia["value"])[upper] - BODY[4:]
+    assert np.all(np.abs(off) < 3.0 * np.array(inertia["std"])[upper])
+    assert np.all(np.array(inertia["std"])[upper] < 0.05 * BODY[7])  # and these say something
+    off = np.array(center["value"]) - BODY[1:4]
+    assert np.all(np.abs(off) < 3.0 * np.array(center["std"]))
+    assert np.all(np.array(center["std"]) < 0.02)
+    for name in ("center_of_mass", "inertia"):
+        assert shift.answers[f"get_{name}"][name] == shift.answers[f"identify_{name}"][name]
 
 
 def check_tracking(odometry: list[Odometry], truth: list[Odometry]) -> None:
     """Tracked positions lie within 3 mm of the ground truth's, and within their own deviation's reach."""
-
-    def stamp(m: Odometry) -> float:
-        return float(m.header.stamp.sec % 100_000 + 1e-9 * m.header.stamp.nanosec)
 
     def place(m: Odometry) -> list[float]:
         p = m.pose.pose.position
         return [p.x, p.y, p.z]
 
     times, places = [stamp(m) for m in truth], np.array([place(m) for m in truth])
-    inside = [m for m in odometry if stamp(m) < times[-1]]
     expected = np.stack(
-        [np.interp([stamp(m) for m in inside], times, places[:, i]) for i in range(3)], axis=1
+        [np.interp([stamp(m) for m in odometry], times, places[:, i]) for i in range(3)], axis=1
     )
-    error = np.array([place(m) for m in inside]) - expected
-    std = np.sqrt(np.array([[m.pose.covariance[i * 7] for i in range(3)] for m in inside]))
-    assert len(inside) > 200
+    error = np.array([place(m) for m in odometry]) - expected
+    std = np.sqrt(np.array([[m.pose.covariance[i * 7] for i in range(3)] for m in odometry]))
+    assert len(odometry) > 797  # all that the IMU sampled in 4 s
     assert np.max(np.abs(error)) < 0.003
     assert np.mean(np.abs(error) < 3.0 * std) > 0.99
 
@@ -140,8 +200,9 @@ def test_a_session_replayed_gives_the_same_inertia_as_read_from_disk(recorded: P
 
         probe.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 50)
         probe.spin_until(lambda: states and states[-1] == "over", 60.0, "the end of the replay")
+        probe.meet("identifier/explain_mismatch")
         future = probe.begin("identifier/identify_inertia")
-        probe.spin_for(0.5)
+        probe.spin_until(lambda: progress, 60.0, "a fit under way")
         second = probe.call("identifier/explain_mismatch")
         assert not second.success
         assert "busy: identify_inertia, run 1" in second.message

@@ -17,8 +17,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 pytest.importorskip("serial", reason="pyserial is not installed: pip install '.[ros]'")
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from node_processes import Graph, Probe, graph_of_the_test, probe_of_the_test  # noqa: F401
-from sensor_msgs.msg import Imu
+from node_processes import Diagnostics, Graph, Probe, graph_of_the_test, probe_of_the_test  # noqa: F401
 
 from rig_identification.session import read_session
 
@@ -64,13 +63,19 @@ def test_a_serial_amplifier_is_read_unplugged_and_plugged_in_again(graph: Graph,
     )
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in cable]
     assert all(b > a for a, b in itertools.pairwise(stamps))
-    assert abs(stamps[-1] - time.time_ns()) < 2e9
+    assert abs(stamps[-1] - time.time_ns()) < 10e9  # heard late on a busy machine
+    diagnostics = Diagnostics(probe)
     amplifier.unplug()
-    probe.spin_for(1.0)
+    probe.spin_until(
+        lambda: diagnostics.says("load_cells: source", str(port)), 20.0, "the word of the lost port"
+    )
     count = len(cable)
     amplifier = Amplifier(port, b"7;1.5;2.0;3.0;4.25;5.0;6.0;-7.5\r\n")
     probe.spin_until(lambda: len(cable) > count + 50, 10.0, "the amplifier's return")
     assert cable[-1].wrench.force.z == pytest.approx(4250.5)
+    probe.spin_until(
+        lambda: not diagnostics.says("load_cells: source", str(port)), 20.0, "no word of a lost port"
+    )
     assert graph.end(node) == (0, "")
     amplifier.unplug()
 
@@ -90,7 +95,7 @@ def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> No
     now = time.time_ns()
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in angles]
     assert {b - a for a, b in itertools.pairwise(stamps)} == {20_000_000}
-    assert 0 <= now - stamps[-1] < 3e9  # no line comes before it is due
+    assert 0 <= now - stamps[-1] < 10e9  # no line comes before it is due
     assert angles[-1].vector.y == pytest.approx(-2.0 * angles[-1].vector.x)
 
 
@@ -114,7 +119,7 @@ def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> No
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused_by_name(graph: Graph, name: str, parameter: str, words: str) -> None:
     process = graph.start(name, parameter)
-    output, _ = process.communicate(timeout=60.0)
+    output, _ = process.communicate(timeout=240.0)
     assert process.returncode == 2
     assert words in output
     assert output.count("\n") == 1
@@ -138,9 +143,12 @@ def test_one_command_brings_the_simulated_rig_up_and_down(graph: Graph, probe: P
         "--set", "rig_simulator.shake.at_start=true", "--set", "imu.simulation.rate=100",
     ]  # fmt: skip
     process = graph.run(command)
-    heard = probe.listen(Imu, "imu/data_raw")
-    probe.spin_until(lambda: len(heard) > 200, 120.0, "the simulated rig")
-    assert graph.end(process, signal.SIGINT, within=40.0) == (0, "")
+    diagnostics = Diagnostics(probe)
+    recorded = diagnostics.arrivals(
+        "recorder", 300, "cable_1/wrench", "cable_4/wrench", "exciter/wrench", "imu/data_raw"
+    )
+    probe.spin_until(recorded, 120.0, "three seconds of the simulated rig")
+    assert graph.end(process, signal.SIGINT) == (0, "")
     (run,) = read_session(folder).recordings
     assert len(run.tension) == 4
     assert run.exciter_force is not None

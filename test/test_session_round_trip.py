@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import sqlite3
 from pathlib import Path
 
@@ -10,12 +11,15 @@ import lz4.frame
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.storage_mcap import McapWriter
 from session_samples import CABLES, START_NS, edit_yaml, make_recording, make_session, rewrite, write_single
 
 from rig_identification.errors import InputError
 from rig_identification.recording import Recording, Series, Session
 from rig_identification.session import read_session, write_session
+from rig_identification.session.messages import TYPESTORE
 
 CHANNELS = ("exciter_force", "exciter_shaft", "imu", "inclination", "mocap", "ground_truth")
 WAYS = [
@@ -284,3 +288,29 @@ def test_progress_names_each_bag(session: Session, tmp_path: Path) -> None:
 def test_cables_of_the_sample_are_all_read(session: Session, tmp_path: Path) -> None:
     folder = write_session(session, tmp_path / "out")
     assert tuple(read_session(folder).recordings[0].tension) == CABLES
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_bag_as_ros2_bag_records_it(session: Session, tmp_path: Path, storage: StoragePlugin) -> None:
+    """With each publisher's quality of service, and topics that are none of the contract's between."""
+    folder = write_session(session, tmp_path / "out")
+    own, theirs = folder / "dynamic_2", tmp_path / "own"
+    shutil.move(own, theirs)
+    second, forever = QosTime(1, 0), QosTime(2147483647, 4294967295)
+    offered = Qos(
+        QosHistory.UNKNOWN, 0, QosReliability.RELIABLE, QosDurability.VOLATILE, forever, forever,
+        QosLiveliness.AUTOMATIC, second, False,
+    )  # fmt: skip
+    others = {"/rosout": "rcl_interfaces/msg/Log", "/rig/odometry": "nav_msgs/msg/Odometry"}
+    with AnyReader([theirs]) as reader, Writer(own, version=9, storage_plugin=storage) as writer:
+        kinds = {item.topic: item.msgtype for item in reader.connections} | others
+        to = {
+            topic: writer.add_connection(topic, kind, typestore=TYPESTORE, offered_qos_profiles=[offered])
+            for topic, kind in kinds.items()
+        }
+        for count, (connection, received, data) in enumerate(reader.messages()):
+            writer.write(to[connection.topic], received, data)
+            if count % 100 == 0:
+                for topic in others:
+                    writer.write(to[topic], received, b"\x00\x01\x00\x00" + bytes(32))
+    assert_same(read_session(folder), session)

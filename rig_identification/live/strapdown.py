@@ -4,7 +4,8 @@ State at the IMU's origin: position (m, world), R_world_body, velocity (m/s, wor
 and accelerometer bias (body axes). Error state (15,): position, rotation (body, right),
 velocity, the two biases (Sola, "Quaternion kinematics for the error-state Kalman filter",
 2017, sections 5 and 6). Integrated alone it drifts; the cables' lengths, gravity's
-direction from inclinometers and the direction in which the cables pull hold it.
+direction from inclinometers and the direction in which the cables pull hold it. The surprise of a
+measurement is its squared innovations over their variances, summed: its number of components on the average.
 """
 
 from __future__ import annotations
@@ -70,20 +71,26 @@ def propagate_sample(p, R, v, bias, P, rate, force, dt, gravity, noise):  # type
 
 @njit(cache=True, nogil=True)
 def _update(P, error, h, residual, variance):  # type: ignore[no-untyped-def]
-    """One scalar measurement: residual = h dx + noise. ``error`` collects the correction."""
+    """One scalar measurement: residual = h dx + noise. ``error`` collects the correction.
+
+    Returns the squared innovation over its variance: 1 on the average, if the state is what P says.
+    """
     gain = P @ h
     spread = variance + h @ gain
-    miss = (residual - h @ error) / spread
+    innovation = residual - h @ error
+    miss = innovation / spread
     for i in range(ERRORS):
         error[i] += gain[i] * miss
     scaled = gain / spread
     for i in range(ERRORS):
         for j in range(ERRORS):
             P[i, j] -= scaled[i] * gain[j]
+    return innovation * miss
 
 
 @njit(cache=True, nogil=True)
 def _inject(p, R, v, bias, P, error):  # type: ignore[no-untyped-def]
+    """Take the correction into the state."""
     for i in range(3):
         p[i] += error[POSITION + i]
         v[i] += error[VELOCITY + i]
@@ -98,14 +105,15 @@ def _inject(p, R, v, bias, P, error):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def update_cables(p, R, v, bias, P, rate, ceiling, arms, lengths, length_std, speed_std):  # type: ignore[no-untyped-def]
-    """Every cable has its length and keeps it.
+def update_cables(p, R, v, bias, P, rate, ceiling, arms, lengths, length_std, speed_std, limit):  # type: ignore[no-untyped-def]
+    """Every cable has its length and keeps it. Returns the surprise; one above ``limit`` changes nothing.
 
     ceiling (n, 3): hinges in world; arms (n, 3): hinges on the body less the IMU's position,
     body axes; length_std m; speed_std m/s: how far a cable may be from keeping its length.
     """
     error = np.zeros(ERRORS)
     h = np.zeros(ERRORS)
+    before, surprise = P.copy(), 0.0
     w = rate - bias[:3]
     for i in range(lengths.shape[0]):
         arm = R @ arms[i]
@@ -117,7 +125,7 @@ def update_cables(p, R, v, bias, P, rate, ceiling, arms, lengths, length_std, sp
         h[:] = 0.0
         h[POSITION : POSITION + 3] = u
         h[ROTATION : ROTATION + 3] = turn
-        _update(P, error, h, lengths[i] - length, length_std**2)
+        surprise += _update(P, error, h, lengths[i] - length, length_std**2)
         hinge = v + R @ _cross(w, arms[i])
         h[:] = 0.0
         h[VELOCITY : VELOCITY + 3] = u
@@ -126,22 +134,34 @@ def update_cables(p, R, v, bias, P, rate, ceiling, arms, lengths, length_std, sp
         across = (hinge - u * (u @ hinge)) / length
         h[POSITION : POSITION + 3] = across
         h[ROTATION : ROTATION + 3] = _cross(arms[i], R.T @ across) + _cross(_cross(w, arms[i]), body_u)
-        _update(P, error, h, -(u @ hinge), speed_std**2)
-    _inject(p, R, v, bias, P, error)
+        surprise += _update(P, error, h, -(u @ hinge), speed_std**2)
+    if surprise > limit:
+        P[:, :] = before
+    else:
+        _inject(p, R, v, bias, P, error)
+    return surprise
 
 
 @njit(cache=True, nogil=True)
-def update_axes_up(p, R, v, bias, P, axes, sines, std):  # type: ignore[no-untyped-def]
-    """Body-fixed axes (m, 3) rise above the horizontal plane with these sines (m,)."""
+def update_axes_up(p, R, v, bias, P, axes, sines, std, limit):  # type: ignore[no-untyped-def]
+    """Body-fixed axes (m, 3) rise above the horizontal plane with these sines (m,).
+
+    Returns the surprise; one above ``limit`` changes nothing.
+    """
     error = np.zeros(ERRORS)
     h = np.zeros(ERRORS)
+    before, surprise = P.copy(), 0.0
     up = R[2].copy()
     for i in range(sines.shape[0]):
         h[:] = 0.0
         # d(axis . (up x dtheta)) = (axis x up) . dtheta
         h[ROTATION : ROTATION + 3] = _cross(axes[i], up)
-        _update(P, error, h, sines[i] - axes[i] @ up, std**2)
-    _inject(p, R, v, bias, P, error)
+        surprise += _update(P, error, h, sines[i] - axes[i] @ up, std**2)
+    if surprise > limit:
+        P[:, :] = before
+    else:
+        _inject(p, R, v, bias, P, error)
+    return surprise
 
 
 @njit(cache=True, nogil=True)

@@ -7,7 +7,7 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from std_msgs.msg import Header
 
-from rig_identification.live.body_tracker import Tracked
+from rig_identification.live.tracked import Tracked
 from rig_identification.nodes.wire import StampedDoubles, decode_batch
 
 Array = NDArray[np.float64]

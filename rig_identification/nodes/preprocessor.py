@@ -63,7 +63,7 @@ class PreprocessorNode(RigNode):
         self._writer = StampedDoubles(WrenchStamped(header=Header(frame_id="center_of_mass")), 6)
         self._wrench = self.create_publisher(WrenchStamped, "generalized_wrench", reliable(depth))
         self._std = self.create_publisher(WrenchStamped, "generalized_wrench_std", reliable(100))
-        self._std_ns = 0  # instant of the last one
+        self._std_slot = 0  # of the last instant looked at: its time in steps of std_rate
         self.published = 0
         self.every(self.own.number("period"), self._work)
 
@@ -96,10 +96,18 @@ class PreprocessorNode(RigNode):
         for message in self._writer.serialize(stamps, wrench):
             self._wrench.publish(message)
         self.published += len(stamps)
+        for k in self._due(stamps):
+            self._publish_std(stamps[k : k + 1], values_at[_POSE][k], tension[k], force[k])
+
+    def _due(self, stamps: Stamps) -> list[int]:
+        """Instants at which deviations are due: by the stamps, in however large batches they come."""
         rate = self.own.number("std_rate")
-        if rate > 0.0 and abs(int(stamps[-1]) - self._std_ns) >= 1e9 / rate:
-            self._std_ns = int(stamps[-1])
-            self._publish_std(stamps[-1:], values_at[_POSE][-1], tension[-1], force[-1])
+        if rate <= 0.0:
+            return []
+        slots = stamps // round(1e9 / rate)
+        due = np.flatnonzero(np.diff(slots, prepend=self._std_slot))
+        self._std_slot = int(slots[-1])
+        return [int(k) for k in due]
 
     def _weight(self, mass: float) -> float:
         """N, as far as it is part of the force."""

@@ -45,6 +45,8 @@ PARAMETERS = (
 TICK, AT_ONCE = 0.002, 400
 #: s for the last messages to arrive before an operated node is told to stop.
 SETTLE = 1.0
+#: s that listeners of a recording that another node is told of get to be found.
+DISCOVERY = 20.0
 #: Services that an identifier and a recorder offer.
 _WINDOW, _RECORDING = ("start_window", "stop_window"), ("start", "stop")
 
@@ -139,7 +141,7 @@ class ReplayNode(RigNode):
         waited = time.monotonic() - self._since
         if self._state == "loading":
             self._load()
-        elif self._state == "pause" and waited > self.own.number("pause") and self._operated_is_there():
+        elif self._state == "pause" and waited > self.own.number("pause") and self._is_met(waited):
             self._describe()
             self._enter("describing")
         elif self._state == "describing" and self._answered():
@@ -189,8 +191,22 @@ class ReplayNode(RigNode):
         if last == len(played.due_ns):
             self._enter("settling")
 
-    def _operated_is_there(self) -> bool:
-        return all(client.service_is_ready() for client in self._clients_of_operated.values())
+    def _is_met(self, waited: float) -> bool:
+        """Whether the operated node's services are there, and somebody listens to every topic to come.
+
+        What is published before a listener is found is lost to it, and a busy machine takes its time.
+        """
+        if not self._clients_of_operated:
+            return True
+        if not all(client.service_is_ready() for client in self._clients_of_operated.values()):
+            return False
+        alone = [name for name in self._coming() if not self._outlets[name].get_subscription_count()]
+        if alone and waited > DISCOVERY:
+            self.fault(f"nobody listens to {', '.join(alone)}; played all the same")
+        return not alone or waited > DISCOVERY
+
+    def _coming(self) -> tuple[str, ...]:
+        return self._played.names if self._played is not None else ()
 
     def _describe(self) -> None:
         """Tell the operated node what comes, without waiting in a callback."""

@@ -104,7 +104,8 @@ class SensorNode(RigNode):
         self._outlets: list[tuple[Topic, slice, object]] = []
         for contract_name, columns in self.device.topics:
             topic = known[f"/{contract_name}"]
-            depth = max(10, int(self.own.number("simulation.rate")))
+            # A second of samples, and more of a slow device: a listener may be kept waiting for its turn
+            depth = max(1000, int(self.own.number("simulation.rate")))
             publisher = self.create_publisher(TYPES[topic.message_type], contract_name, reliable(depth))
             self._outlets.append((topic, columns, publisher))
         self.published = 0

@@ -9,11 +9,14 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from rig_identification.nodes.last_resort import exit_after
 from rig_identification.nodes.process import StopRequest
 from rig_identification.nodes.rig_node import RigNode
 
 #: EventsExecutor.spin() dispatches nothing; spinning until a future does.
 _FOREVER = 1e9
+#: s that the middleware and the interpreter get to clean up, once the node has given back what it held.
+PATIENCE = 10
 
 
 def spin(create: Callable[[], RigNode], stop: StopRequest, arguments: list[str] | None = None) -> None:
@@ -47,5 +50,6 @@ def spin(create: Callable[[], RigNode], stop: StopRequest, arguments: list[str] 
         stop.notify = lambda: None  # a second signal must not disturb the clean-up
         if node is not None:
             node.close()
+            exit_after(PATIENCE)
             node.destroy_node()
         rclpy.try_shutdown()

@@ -10,13 +10,14 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from visualization_msgs.msg import MarkerArray
 
-from rig_identification.live.body_tracker import BodyTracker, Tracked
+from rig_identification.live.body_tracker import BodyTracker
 from rig_identification.live.machine_code import compile_tracker
+from rig_identification.live.tracked import Tracked
 from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.markers import rig_markers
 from rig_identification.nodes.odometry_wire import OdometryWriter
 from rig_identification.nodes.parameters import OwnParameter, within
-from rig_identification.nodes.rig_node import ERROR, OK, RigNode, diagnostic, reliable
+from rig_identification.nodes.rig_node import ERROR, OK, WARN, RigNode, diagnostic, reliable
 from rig_identification.session.topics import expected_topics
 
 PARAMETERS = (
@@ -54,6 +55,7 @@ class TrackerNode(RigNode):
         self._latest: Tracked | None = None
         self._silent_tension: list[str] = []
         self.latency: deque[float] = deque(maxlen=20_000)  # s, from an IMU sample's arrival to its odometry
+        self._found_anew = 0  # times, by the last look
         self.tracked = self.late = 0  # samples since the start; those whose odometry came later than LATE
         self.every(self.own.number("period"), self._work)
         if self.own.number("marker_rate") > 0.0:
@@ -69,7 +71,7 @@ class TrackerNode(RigNode):
             elif channel == "inclination":
                 self.tracker.add_inclination(batch.stamp_ns, batch.values)
             elif channel == "exciter_force":
-                self.tracker.add_exciter(batch.values)
+                self.tracker.add_exciter(batch.stamp_ns, batch.values)
             elif batch.topic.cable is not None and len(batch.values):
                 self.tracker.add_tension(batch.topic.cable, batch.stamp_ns, batch.values)
                 self._tension[batch.topic.cable] = float(batch.values[-1, 0])
@@ -103,11 +105,17 @@ class TrackerNode(RigNode):
         else:
             latency = np.array(self.latency)
             std = float(np.sqrt(np.max(np.linalg.eigvalsh(self._latest.pose_covariance[-1, :3, :3]))))
+            found_anew = self.tracker.surprises + self.tracker.restarts
+            level, message = OK, f"position to {1e3 * std:.1f} mm"
+            if found_anew != self._found_anew:
+                level, message = WARN, f"{message}; the body was lost a moment ago and found anew"
+            self._found_anew = found_anew
             line = diagnostic(
-                name, OK, f"position to {1e3 * std:.1f} mm",
+                name, level, message,
                 latency_p50_ms=f"{1e3 * np.percentile(latency, 50):.2f}",
                 latency_p99_ms=f"{1e3 * np.percentile(latency, 99):.2f}",
                 tracked=self.tracked, late=self.late, restarts=self.tracker.restarts,
+                surprises=self.tracker.surprises,
             )  # fmt: skip
         return [*super().status(), line]
 
