@@ -14,9 +14,10 @@ from rig_identification.estimate.identify import fit_session, judged, pose_probl
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import weighed_otherwise
+from rig_identification.mismatch.amounts import Amount
 from rig_identification.mismatch.screen import with_reference
-from rig_identification.mismatch.search import Amount, attempt, mass_of
 from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
+from rig_identification.mismatch.trial import attempt, mass_of
 from rig_identification.recording import Series, Session
 from rig_identification.simulate import simulate_session
 

@@ -29,17 +29,13 @@ from rig_identification.mismatch.search import (
     AT_NOISE,
     CHIEF,
     MOST_EFFECTS,
-    Trial,
     Trials,
-    adopted,
-    beyond_doubt,
     catalogue,
-    mass_of,
     needed_gain,
-    strength,
     trials,
 )
 from rig_identification.mismatch.slack import Spell, taut_ideal, with_slack
+from rig_identification.mismatch.trial import Trial, adopted, beyond_doubt, mass_of, strength
 from rig_identification.mismatch.unknown import unknown_finding
 from rig_identification.result import Finding, Mismatch
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig_identification.mismatch.search import Trial
+from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Finding
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from rig_identification.estimate.solve import Evaluation, Problem
 
 if TYPE_CHECKING:
-    from rig_identification.mismatch.search import Trial
+    from rig_identification.mismatch.trial import Trial
 
 #: Highest frequency (Hz) of the motion: an exciter of such rigs turns below 2.5 Hz.
 MOVING = 4.0

@@ -13,7 +13,7 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.locate import Event, find_event
-from rig_identification.mismatch.search import mass_of
+from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
 from rig_identification.result import Mismatch
 

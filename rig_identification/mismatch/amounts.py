@@ -1,0 +1,154 @@
+"""What gives way, by trying how much: cables that stretch and a ceiling that yields.
+
+They ring at tens of hertz: first order about a rig that does not give way tells next to nothing of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit, settled_starts
+from rig_identification.estimate.parameters import AXES
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, shortened
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.riders import Swing, rider_candidate
+from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.supports import (
+    cable_elasticity,
+    ceiling_candidate,
+    gives_way,
+    largest_compliance,
+    usual_stiffness,
+)
+from rig_identification.mismatch.trial import HORIZONS, promised
+
+Array = NDArray[np.float64]
+
+#: A promise this much (nats) behind the best is not worth a fit, in parts of the best; nor is what gives way
+#: where trying its amounts takes away no larger part of what is left.
+WORTH = 0.05
+#: Parts of the largest compliance of a ceiling that are tried.
+SINKS = (0.03, 0.7)
+#: Multiples of the usual stiffness of cables that are tried: thin wire to thick rope.
+STRETCHES = (0.1, 10.0)
+#: Factor between two amounts, and where little is left.
+SPACED, FINELY = 3.2, 1.4
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of what a change of the model's amount explains, by trying it instead of to first order.
+
+    It is tried over the second of HORIZONS: what rings is soon out of step everywhere else. Where much is
+    left what that tells is told of all; near the noise it tells no more than it sees.
+    """
+
+    problem: Problem
+    evaluation: Evaluation
+    candidate: Candidate
+    name: str  # of the parameter that an amount is a value of
+
+    @cached_property
+    def far(self) -> bool:
+        """Whether much is left."""
+        return misfit(self.evaluation) > NEAR_SQUARE
+
+    @cached_property
+    def part(self) -> Problem:
+        """What amounts are tried on."""
+        return shortened(self.problem, HORIZONS[-1])
+
+    @cached_property
+    def before(self) -> Evaluation | None:
+        """That part without the change."""
+        return evaluate(self.part, self.evaluation.point, residuals_only=True)
+
+    def gain(self, amount: float) -> float:
+        """What ``amount`` explains (nats) with everything else but start states as it is."""
+        wide = extended(self.part, (self.candidate,))
+        start = carried(wide, self.problem, self.evaluation.point)
+        before = self.before
+        try:
+            point = promised(wide, start, self.candidate, {self.name: amount}, self.evaluation)
+            found = evaluate(wide, replace(point, starts=settled_starts(wide, point)), residuals_only=True)
+        except FloatingPointError:
+            return 0.0
+        if before is None or found is None:
+            return 0.0
+        scale = excess(self.evaluation) / max(1.0, excess(before)) if self.far else 1.0
+        return scale * (before.cost - found.cost)
+
+    def best(self, amounts: list[float]) -> Promise:
+        """The promise of the best of ``amounts``."""
+        gains = [self.gain(amount) for amount in amounts]
+        at = int(np.argmax(gains))
+        return self._promise(amounts[at], gains[at])
+
+    def refined(self, promise: Promise, spaced: float) -> Promise:
+        """The promise with the best amount within a factor of ``spaced`` of its own."""
+        amount = promise.values[self.name]
+        found = minimize_scalar(
+            lambda x: -self.gain(amount * float(np.exp(x))),
+            bounds=(-np.log(spaced), np.log(spaced)),
+            method="bounded",
+            options={"xatol": 0.1},
+        )
+        better = self._promise(amount * float(np.exp(found.x)), -float(found.fun))
+        return max(promise, better, key=lambda p: p.gain)
+
+    def _promise(self, amount: float, gain: float) -> Promise:
+        left = max(1.0, excess(self.evaluation))
+        return Promise(self.candidate, max(0.0, gain), {self.name: amount}, max(0.0, gain) / left)
+
+
+def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Promise]:
+    """What gives way, each scanned over its amount; nothing where the model gives way already."""
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    if gives_way(model):
+        return []
+    elasticity = cable_elasticity(rig, model, mass)
+    tried = [Amount(problem, evaluation, elasticity, "cable.axial_stiffness")]
+    for axis, a in enumerate(AXES):
+        ceiling = ceiling_candidate(rig, model, mass, axis)
+        tried.append(Amount(problem, evaluation, ceiling, f"ceiling.compliance.{a}"))
+    # Near the noise little of it is seen: an amount that is not nearly right explains none of that
+    spaced = SPACED if misfit(evaluation) > NEAR_SQUARE else FINELY
+    stretches = usual_stiffness(rig, mass) * _spread(STRETCHES, spaced)
+    sinks = largest_compliance(rig, mass) * _spread(SINKS, spaced)
+    out = [amount.best(list(sinks if k else stretches)) for k, amount in enumerate(tried)]
+    first = int(np.argmax([promise.gain for promise in out]))
+    if out[first].gain > 0.0:
+        out[first] = tried[first].refined(out[first], spaced)
+    return out
+
+
+def _spread(ends: tuple[float, float], spaced: float) -> Array:
+    """Amounts from end to end, at most a factor of ``spaced`` apart."""
+    count = int(np.ceil(np.log(ends[1] / ends[0]) / np.log(spaced))) + 1
+    return np.asarray(np.geomspace(*ends, count))
+
+
+def far_promises(
+    problem: Problem, evaluation: Evaluation, promises: list[Promise], mass: float
+) -> list[Promise]:
+    """What gives way, and the best rider to one side and to all, whatever screening promises of them."""
+    if gives_way(problem.bench.parameters.model):
+        return []
+    out = [p for p in supports(problem, evaluation, mass) if p.share > WORTH]
+    riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
+    out += riders[:1]
+    out += [p for p in promises if p.candidate.effect == "loose_mass"][:1]
+    if riders and riders[0].candidate.effect == "sprung_mass":
+        # What swings along one axis may swing to all sides
+        first = riders[0]
+        o = {p.name: p for p in first.candidate.parameters}
+        swing = Swing("xy", o["sprung_mass.frequency"].nominal)
+        at = np.array([o[f"sprung_mass.position.{a}"].nominal for a in AXES])
+        liquid, values = rider_candidate(problem, swing, mass, first.values["sprung_mass.mass"], at)
+        out.append(Promise(liquid, 0.0, values))
+    return out

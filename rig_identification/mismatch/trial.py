@@ -1,0 +1,201 @@
+"""One hypothesis in the model: started where screening promised, fitted, and what its fit says of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
+from rig_identification.estimate.observability import invert_information
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, solve
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.screen import Promise, carried, extended
+
+Array = NDArray[np.float64]
+
+#: Std by which one of several numbers may lie on the wrong side of zero by chance.
+ABSURD = 3.0
+#: Steps of a first, short fit (more where the model itself changes) and of one to the end.
+FIRST_STEPS = 4
+CHANGED_STEPS = 7
+LAST_STEPS = 20
+#: Share of their prior's std within which such ratios are held at first.
+HELD = 0.05
+#: Ends (s) of the first horizons over which a changed model is fitted.
+HORIZONS = (0.4, 1.2)
+#: Std of its prior that a fit starts away from at most.
+FARTHEST = 3.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A hypothesis fitted in full."""
+
+    candidate: Candidate
+    problem: Problem
+    evaluation: Evaluation
+    evidence: float  # log marginal likelihood less a constant
+    settled: bool = False  # fitted to its end
+
+
+def mass_of(problem: Problem, evaluation: Evaluation) -> float:
+    """Mass of the body as fitted, kg."""
+    return float(problem.bench.parameters.elements(evaluation.point.theta)[0])
+
+
+def log_evidence(evaluation: Evaluation) -> float:
+    """Laplace: log posterior at its peak, less half the log of how much sharper it is than the prior.
+
+    Start states have flat priors and count alike in every hypothesis; their share cancels
+    but for its correlation, which the determinant keeps.
+    """
+    sign, log_det = np.linalg.slogdet(evaluation.information)
+    return -evaluation.cost - 0.5 * float(log_det) if sign > 0 else -np.inf
+
+
+def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Problem, Evaluation]:
+    """A trial's effect in the model of all pieces, fitted."""
+    wide = extended(problem, (trial.candidate,))
+    if len(wide.runs) == len(trial.problem.runs):
+        return trial.problem, trial.evaluation
+    theta = trial.evaluation.point.theta
+    point = carried(wide, problem, evaluation.point)
+    if trial.candidate.settle is not None:
+        point = trial.candidate.settle(wide, replace(point, theta=theta), evaluation)
+    known = {
+        (run.recording.name, run.offset): start
+        for run, start in zip(trial.problem.runs, trial.evaluation.point.starts, strict=True)
+    }
+    starts = tuple(
+        known.get((run.recording.name, run.offset), start)
+        for run, start in zip(wide.runs, point.starts, strict=True)
+    )
+    fitted, _ = solve(wide, replace(point, theta=theta, starts=starts), iterations=6, tolerance=0.5)
+    return wide, fitted
+
+
+def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial | None:
+    """A first, short fit of one hypothesis from what screening promised; None where it cannot start."""
+    candidate = promise.candidate
+    # Blows have no second derivative to follow
+    bends = candidate.build is not None and candidate.effect != "loose_mass"
+    wide = extended(problem, (candidate,))
+    begun = carried(wide, problem, evaluation.point)
+    point = promised(wide, begun, candidate, promise.values, evaluation)
+    try:
+        if candidate.build is not None:
+            point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE)
+        steps = FIRST_STEPS if candidate.build is None else CHANGED_STEPS
+        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=bends)
+    except FloatingPointError:
+        return None
+    return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+
+
+def promised(
+    problem: Problem, point: Point, candidate: Candidate, values: dict[str, float], evaluation: Evaluation
+) -> Point:
+    """The point with ``values`` of a hypothesis that is in the model, in their own units."""
+    theta = point.theta.copy()
+    for k, p in enumerate(candidate.parameters):
+        if p.name not in values:
+            continue
+        i = problem.bench.parameters.index_of(p.name)
+        free = problem.bench.parameters.free[i - INERTIAL]
+        theta[i] = float(np.clip(free.position(values[p.name]), -FARTHEST, FARTHEST))
+        if k < candidate.positive:
+            theta[i] = max(theta[i], 0.0)
+    point = replace(point, theta=theta)
+    return point if candidate.settle is None else candidate.settle(problem, point, evaluation)
+
+
+def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool) -> Point:
+    """The point from where a fit of a changed model to all of its runs starts.
+
+    A changed model throws the start states out first, and its amount comes before its other ratios. Where
+    much is left (far) it is fitted over the first instants before: what stretches or yields rings at tens of
+    hertz, over some seconds a stiffness a percent off is half a turn out of step, and everything else bends
+    to that (growing.py). Near the noise first order is about right, and short horizons tell nothing.
+    """
+    if not far:
+        return _with_amount(problem, candidate, replace(point, starts=settled_starts(problem, point)))
+    for end in HORIZONS:
+        part = held_over(problem, end, point.theta[:INERTIAL].copy())
+        point = replace(point, starts=settled_starts(part, point))
+        if end == HORIZONS[0]:
+            point = _with_amount(part, candidate, point)
+        fitted, _ = solve(part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, bends=True)
+        point = fitted.point
+    return replace(point, starts=settled_starts(problem, point))
+
+
+def _with_amount(problem: Problem, candidate: Candidate, point: Point) -> Point:
+    """The point after a few steps in which an effect's amount moves and its other ratios are held.
+
+    How much there is of an effect shows at any frequency or damping of its own; these make sense only of
+    about the right amount, and run far away before.
+    """
+    parameters = problem.bench.parameters
+    own = {p.name for p in candidate.parameters[1:]}
+    held = tuple(
+        replace(p, prior_std=HELD * p.prior_std) for p in parameters.free if p.ratio and p.name in own
+    )
+    narrow = replace(problem, bench=replace(problem.bench, parameters=parameters.having(held)))
+    fitted, _ = solve(
+        narrow, carried(narrow, problem, point), iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH
+    )
+    return carried(problem, narrow, fitted.point)
+
+
+def finished(trial: Trial) -> Trial | None:
+    """The trial fitted to its end; None where its sign makes no sense there."""
+    if not trial.settled:
+        fitted, _ = solve(
+            trial.problem,
+            trial.evaluation.point,
+            iterations=LAST_STEPS,
+            tolerance=0.05,
+            polish=POLISH,
+            bends=trial.candidate.build is not None,
+        )
+        trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
+    if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial)):
+        return None
+    return trial
+
+
+def signs(trial: Trial) -> list[float]:
+    """What cannot be negative, in units of its own std."""
+    parameters = trial.problem.bench.parameters
+    index = [parameters.index_of(p.name) for p in trial.candidate.parameters[: trial.candidate.positive]]
+    if not index:
+        return []
+    std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
+    return [float(trial.evaluation.point.theta[i] / std[i]) for i in index]
+
+
+def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
+    """Whether a freed doubt really lies beyond what is ordinary: an addition always does."""
+    parameters = trial.problem.bench.parameters
+    values = dict(
+        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
+    )
+    freed = [p for p in trial.candidate.parameters if p.name in ordinary]
+    if not freed:
+        return True
+    return any(abs(values[p.name] - p.nominal) > limit * ordinary[p.name] for p in freed)
+
+
+def strength(trial: Trial) -> float:
+    """Gain (nats) of the trial's parameters over none of them, to second order (Wald)."""
+    parameters = trial.problem.bench.parameters
+    free = {p.name: p for p in parameters.free}
+    index = [parameters.index_of(p.name) for p in trial.candidate.parameters if not free[p.name].ratio]
+    if not index:
+        return float(np.inf)
+    value = trial.evaluation.point.theta[index]
+    covariance = invert_information(trial.evaluation.information)[np.ix_(index, index)]
+    return 0.5 * float(value @ np.linalg.solve(covariance, value))
