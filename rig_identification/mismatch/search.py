@@ -26,6 +26,7 @@ from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.sensor_errors import sensor_errors
+from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, log_evidence, mass_of
 
 Notify = Callable[[str], None]
@@ -216,10 +217,14 @@ def begun(
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
     reached, kept = 0.0, 0.0
+    slow = gives_way(problem.bench.parameters.model)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
         worthy = sorted(worthy, key=lambda p: (p.candidate.build is not None, -p.gain))
     for promise in worthy:
+        if promise.candidate.build is not None and promise.share < CHIEF and slow:
+            # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
+            continue
         if not far and promise.gain < min(CLOSE * kept, kept - BEATEN):
             # Another hypothesis promised much more, near the noise, and kept it
             continue
