@@ -14,7 +14,7 @@ from rig_identification.estimate.identify import fit_session, judged, pose_probl
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import weighed_otherwise
-from rig_identification.mismatch.amounts import Amount
+from rig_identification.mismatch.amounts import SPACED, Amount
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
 from rig_identification.mismatch.trial import attempt, mass_of
@@ -48,7 +48,7 @@ def test_the_amount_of_stretch_is_found_from_far_off(
     mass = mass_of(problem, evaluation)
     elasticity = cable_elasticity(problem.bench.rig, problem.bench.parameters.model, mass)
     amount = Amount(problem, evaluation, elasticity, "cable.axial_stiffness")
-    promise = amount.refined(amount.best([start * STIFFNESS, 1.8 * STIFFNESS]))
+    promise = amount.refined(amount.best([start * STIFFNESS, 1.8 * STIFFNESS]), SPACED)
     assert promise.values["cable.axial_stiffness"] == pytest.approx(STIFFNESS, rel=0.3)
     trial = attempt(problem, evaluation, promise)
     assert trial is not None

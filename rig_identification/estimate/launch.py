@@ -56,18 +56,24 @@ class Launch:
         """Start states from the tracked motion; inertia from its momentum where all tensions are measured."""
         if self.rest is None:
             raise ValueError("from_rest comes first")
+        sure, unsure = self._by_momentum(self.rest, 0.0), self._by_momentum(self.rest, DOUBTED)
+        # A rig as described is tracked best where it is believed, and led astray where it is not as described
+        return min((sure, unsure), key=lambda found: found[1])[0]
+
+    def _by_momentum(self, rest: State, doubted: float) -> tuple[Launch, float]:
+        """The launch with rig and devices ``doubted`` (tolerances), and how badly momentum balances then."""
         problem, parameters = self.problem, self.problem.bench.parameters
         starts, balances = [], []
         for run in problem.runs:
-            found = tracked(problem.bench, run.until(REGRESSED), self.theta, self.rest)
-            starts.append(self.rest if found is None else found.state(0))
+            found = tracked(problem.bench, run.until(REGRESSED), self.theta, rest, doubted)
+            starts.append(rest if found is None else found.state(0))
             both = None if found is None else balance(found, run.until(REGRESSED), parameters, self.theta)
             if both is not None:
                 balances.append(both)
-        theta = self.theta.copy()
+        theta, left = self.theta.copy(), np.inf
         if balances:
-            theta[:INERTIAL] = regress(balances, theta[:INERTIAL], problem.weak)
-        return replace(self, theta=theta, starts=tuple(starts))
+            theta[:INERTIAL], left = regress(balances, theta[:INERTIAL], problem.weak)
+        return replace(self, theta=theta, starts=tuple(starts)), left
 
     def point(self) -> Point:
         """Where the fit starts."""
@@ -76,13 +82,13 @@ class Launch:
         return Point(self.theta, self.starts, (self.rest,) * len(self.problem.rests))
 
 
-def tracked(bench: Bench, run: Run, theta: Array, rest: State) -> Track | None:
-    """A run tracked from a start that may be anywhere near rest."""
+def tracked(bench: Bench, run: Run, theta: Array, rest: State, doubted: float = 0.0) -> Track | None:
+    """A run tracked from a start that may be anywhere near rest. doubted: see :func:`launch_state`."""
     physics = bench.parameters.physics(theta)
     size = float(np.max(extent(bench.rig)))
     noise = wrench_noise(physics[layout.INERTIAL], bench.rig.gravity, size, run.grid.step, SHARE)
-    start = launch_state(bench, run, theta, rest, noise)
-    return track(bench, run, theta, start, start_covariance(0.02, 0.05), noise, DOUBTED)
+    start = launch_state(bench, run, theta, rest, noise, doubted)
+    return track(bench, run, theta, start, start_covariance(0.02, 0.05), noise, doubted)
 
 
 #: Horizons (s) over which a start state is found, a random wrench standing for what is not known; and those
@@ -92,10 +98,18 @@ LAUNCHES, CLOSER = (0.2, 0.5, 1.0), (0.05, 0.1)
 DOUBTED = 3.0
 
 
-def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array | None = None) -> State:
+def launch_state(
+    bench: Bench,
+    run: Run,
+    theta: Array,
+    rest: State,
+    noise: Array | None = None,
+    doubted: float = 0.0,
+) -> State:
     """Start state of a run: within a fifth of the cables' length of rest, by its first second.
 
-    noise (6, 6): random wrench, given where nothing is known yet; rig and devices are then doubted too.
+    noise (6, 6): random wrench, given where the body is not known yet. doubted: how far rig and devices may
+    be off, in tolerances (fit_start).
     """
     start = rest
     if bench.mocap is not None:
@@ -103,15 +117,21 @@ def launch_state(bench: Bench, run: Run, theta: Array, rest: State, noise: Array
         errors = bench.parameters.device(theta)[first : first + sensors.MOCAP_SIZE]
         seen = start_from_mocap(model_at(bench.parameters, theta), run, bench.mocap, errors)
         start = rest if seen is None else seen
-    state, square = _launched(bench, run, theta, start, noise, LAUNCHES)
+    state, square = _launched(bench, run, theta, start, noise, doubted, LAUNCHES)
     if square > HOPELESS:
-        closer = _launched(bench, run, theta, start, noise, CLOSER + LAUNCHES)
+        closer = _launched(bench, run, theta, start, noise, doubted, CLOSER + LAUNCHES)
         state = closer[0] if closer[1] < square else state
     return state
 
 
 def _launched(
-    bench: Bench, run: Run, theta: Array, start: State, noise: Array | None, horizons: tuple[float, ...]
+    bench: Bench,
+    run: Run,
+    theta: Array,
+    start: State,
+    noise: Array | None,
+    doubted: float,
+    horizons: tuple[float, ...],
 ) -> tuple[State, float]:
     """Start state by growing horizons, and the mean square that its last fit leaves (none: infinite)."""
     length = float(np.mean([cable.length for cable in bench.rig.cables]))
@@ -125,7 +145,7 @@ def _launched(
             tolerance=1e-2,
             extra_noise=noise,
             spread=0.2 * length,
-            doubted=0.0 if noise is None else DOUBTED,
+            doubted=doubted,
         )
         if found is not None:
             square = float(np.mean(found[0].residual ** 2)) if found[0].residual.size else 0.0

@@ -104,9 +104,10 @@ def balance(track: Track, run: Run, parameters: ParameterSet, theta: Array) -> t
     return rows.reshape(-1, 10), right.reshape(-1)
 
 
-def regress(balances: list[tuple[Array, Array]], theta: Array, weak: Array) -> Array:
-    """(10,) log-Cholesky vector of the body that balances momentum best.
+def regress(balances: list[tuple[Array, Array]], theta: Array, weak: Array) -> tuple[Array, float]:
+    """(10,) log-Cholesky vector of the body that balances momentum best, and what it leaves.
 
+    What is left is the sum of the logarithms of the root mean squares of force and moment rows.
     theta (10,): guess; weak (10,): std of the belief in it, so that what the motion does not
     excite stays there. The imbalance is weighed by its own size at each step, so that poor
     tracking counts as what it is. Every iterate is a body that can exist.
@@ -115,13 +116,18 @@ def regress(balances: list[tuple[Array, Array]], theta: Array, weak: Array) -> A
     right = np.concatenate([b[1] for b in balances])
     # Force and moment rows scatter differently: weigh each kind by its own spread
     kind = np.tile(np.repeat([0, 1], 3), rows.shape[0] // 6)
+
+    def spreads(miss: Array) -> Array:
+        return np.array([np.sqrt(np.mean(miss[kind == k] ** 2)) + 1e-12 for k in (0, 1)])
+
     guess = theta.copy()
     for _ in range(REGRESSION_STEPS):
         miss = right - rows @ linear_from_log_cholesky(theta)
         slope = rows @ complex_step_jacobian(linear_from_log_cholesky, theta)
-        spread = np.array([np.sqrt(np.mean(miss[kind == k] ** 2)) + 1e-12 for k in (0, 1)])[kind]
+        spread = spreads(miss)[kind]
         slope, miss = slope / spread[:, None], miss / spread
         normal = slope.T @ slope + np.diag(1.0 / weak**2)
         change = np.linalg.solve(normal, slope.T @ miss - (theta - guess) / weak**2)
         theta = theta + change * min(1.0, 1.0 / float(np.max(np.abs(change))))
-    return theta
+    left = spreads(right - rows @ linear_from_log_cholesky(theta))
+    return theta, float(np.sum(np.log(left)))

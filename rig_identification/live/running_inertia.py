@@ -125,7 +125,7 @@ class RunningInertia:
         if len(self._rows) < FEWEST:
             return None
         rows, right = np.array(self._rows), np.array(self._right)
-        theta = regress([(rows.reshape(-1, 10), right.reshape(-1))], self._guess, self._weak)
+        theta = regress([(rows.reshape(-1, 10), right.reshape(-1))], self._guess, self._weak)[0]
         covariance = self._covariance(rows, right, theta)
         to_elements = complex_step_jacobian(
             lambda t: elements_from_linear(linear_from_log_cholesky(t)), theta

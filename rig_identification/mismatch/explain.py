@@ -24,15 +24,17 @@ from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.push import without_push
-from rig_identification.mismatch.screen import carried, extended, with_reference
+from rig_identification.mismatch.screen import carried, extended, screen, with_reference
 from rig_identification.mismatch.search import (
     AT_NOISE,
     CHIEF,
     MOST_EFFECTS,
     Trials,
     catalogue,
+    count_of,
     needed_gain,
     trials,
+    worth_a_fit,
 )
 from rig_identification.mismatch.slack import Spell, taut_ideal, with_slack
 from rig_identification.mismatch.trial import Trial, adopted, beyond_doubt, mass_of, strength
@@ -77,8 +79,7 @@ def explain(ideal: Ideal, spells: list[Spell], notify: Notify) -> Explained | No
     far, at short pieces, in which no model is far off. spells: in which a cable carries nothing (slack.py).
     """
     if ideal.mismatch.verdict == "none":
-        # What hides within noise is no finding
-        return None
+        return _hidden(ideal, notify)
     if not spells:
         return _explain(ideal, notify)
     notify("search: stretches in which every cable pulls", 0.02)
@@ -89,6 +90,23 @@ def explain(ideal: Ideal, spells: list[Spell], notify: Notify) -> Explained | No
     if near_noise(taut.fitted):
         found = _explain(taut, notify)
     return with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
+
+
+def _hidden(ideal: Ideal, notify: Notify) -> Explained | None:
+    """What no residual shows by itself, and a hypothesis that knows what to look for does.
+
+    A score test of all hypotheses at once: one among ever so many that gains more than chance does is fitted,
+    and told if it explains every run. Otherwise there is nothing to tell.
+    """
+    notify("search: anything within the noise", 0.1)
+    fitted = ideal.fitted
+    problem = with_reference(fitted.problem, fitted.rest)
+    candidates = catalogue(problem)
+    promises = screen(problem, fitted.evaluation, candidates, mass_of(problem, fitted.evaluation))
+    if not worth_a_fit(promises, count_of(candidates)):
+        return None
+    best = _named(ideal, _Search(problem, problem, fitted.evaluation, excess(fitted.evaluation)), notify)
+    return best if best is not None and best.mismatch.verdict == "explained" and not best.trace else None
 
 
 def _explain(ideal: Ideal, notify: Notify) -> Explained | None:

@@ -74,6 +74,11 @@ def catalogue(problem: Problem) -> list[Candidate]:
     ]
 
 
+def count_of(candidates: list[Candidate]) -> int:
+    """How many hypotheses are tried: riders swing in many ways."""
+    return len(candidates) + len(SWINGS)
+
+
 def needed_gain(candidate: Candidate, count: int) -> float:
     """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks, Bonferroni)."""
     return 0.5 * float(chi2.isf(FALSE_ALARM / count, len(candidate.parameters)))
@@ -142,12 +147,12 @@ def trials(
     far = misfit(evaluation) > NEAR_SQUARE
     if far:
         problem, evaluation = worst_pieces(problem, evaluation)
-    count = len(candidates) + len(SWINGS)
+    count = count_of(candidates)
     promises = screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
     tried: list[Trial] = []
     if not far or (promises and promises[0].share > DIRECT):
-        tried = begun(here, seen, _worthy(promises, count), far, notify)
+        tried = begun(here, seen, worth_a_fit(promises, count), far, notify)
     device, needed = None, log_evidence(seen) + MEANT
     if far and not any(_at_noise(t) for t in tried):
         liar = None
@@ -159,21 +164,21 @@ def trials(
             # About the fit that does not hear it, what is wrong with it shows as it is
             device = liar.device
             about = evaluate(problem, liar.point) or seen
-            worthy = _worthy(screen(problem, about, candidates, mass), count, device)
+            worthy = worth_a_fit(screen(problem, about, candidates, mass), count, device)
             tried += begun(here, about, worthy, False, notify)
         if not any(_at_noise(t) for t in tried):
             known = {t.candidate.label for t in tried}
             notify("what gives way")
             worthy = [p for p in far_promises(here, seen, promises, mass) if p.candidate.label not in known]
             known |= {p.candidate.label for p in worthy}
-            worthy += [p for p in _worthy(promises, count) if p.candidate.label not in known]
+            worthy += [p for p in worth_a_fit(promises, count) if p.candidate.label not in known]
             tried += begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify)
     if not far and not _without_support(tried, seen):
         # Of what rings first order says nothing
         notify("what gives way")
         known = {t.candidate.label for t in tried}
         worthy = [p for p in supports(here, seen, mass) if p.candidate.label not in known]
-        tried += begun(here, seen, _worthy(sorted(worthy, key=lambda p: -p.gain), count), False, notify)
+        tried += begun(here, seen, worth_a_fit(sorted(worthy, key=lambda p: -p.gain), count), False, notify)
     if not tried:
         return Trials([], device)
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
@@ -191,7 +196,7 @@ def trials(
     return Trials(told_apart(done, MEANT), device, tuple(beaten))
 
 
-def _worthy(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
+def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
     """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie."""
     worthy = [p for p in promises if p.gain > needed_gain(p.candidate, count)]
     if device is not None:
