@@ -32,6 +32,7 @@ class Candidate:
     #: Start states, or a body, that suit the changed model, from a fit without it
     settle: Callable[[Problem, Point, Evaluation], Point] | None = None
     experiment: str = ""  # what would tell it from its rivals
+    hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property
     def label(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,12 @@ from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import believed_point
 from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem
-from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.mismatch.left_out_physics import added
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel
+from rig_identification.result import ELEMENTS
 from rig_identification.rig import Rig
 
 
@@ -47,16 +49,43 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
         Candidate(
             "air_drag",
             (added("air.turning", "m^5", 3.0 * size**2 * (0.5 * size) ** 3, block + place.TURNING_DRAG),),
-            "The air resists the body's turning with the square of its rate: Cd A r^3 = {value}, for a plate "
-            "of area A at distance r.",
+            "The air resists the body's turning with the square of its rate, as a plate of Cd A = {value} "
+            "does that stands across its way at the outermost hinges' distance.",
             "Turn it slowly, or keep the drag in the model.",
             {"channel": None, "axis": None},
             positive=1,
-            name_in_result="turning_drag",
+            tell=_as_plate(0.5 * size),
         ),
     ]
     line = _line_of_hinges(rig)
     return out if line is None else [*out, _rolling(rig, mass, size, line)]
+
+
+def _as_plate(distance: float) -> Callable[[dict[str, float], dict[str, float]], Told]:
+    """What resists turning, as the drag area of a plate at a ``distance`` (m) from the axis, and as it is."""
+
+    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+        value, std = values["air.turning"], stds["air.turning"]
+        return {
+            "drag_area": (value / distance**3, std / distance**3, "m^2"),
+            "turning_drag": (value, std, "m^5"),
+        }
+
+    return told
+
+
+#: Share of a body axis in the line of the hinges above which its elements have to do with rolling about it.
+ALONG = 0.1
+
+
+def hidden_by_roll(line: np.ndarray) -> tuple[str, ...]:
+    """Elements that only rolling about a ``line`` (3,) tells.
+
+    Rolling shows stiffness, depth of the centre of mass and inertia about the line together. Another law of
+    the same stiffness, which nothing here tells from this one, makes another body of them.
+    """
+    about = {"xyz"[i] for i in range(3) if abs(line[i]) > ALONG}
+    return tuple(name for name in ELEMENTS if name == "cz" or (name[0] == "J" and about & set(name[1:])))
 
 
 def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
@@ -97,6 +126,7 @@ def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
         name_in_result="roll_stiffness",
         build=build,
         settle=settle,
+        hides=hidden_by_roll(line),
     )
 
 

@@ -31,7 +31,7 @@ from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.search import needed_gain
 from rig_identification.mismatch.threads import physics_of_pendulums
 from rig_identification.mismatch.trial import Trial, finished, log_evidence, mass_of, signs
-from rig_identification.result import Mismatch
+from rig_identification.result import ELEMENTS, Mismatch
 
 Notify = Callable[[str, float], None]
 
@@ -233,7 +233,9 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     else:
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
         mismatch = Mismatch("unexplained", text, tuple(findings), tuple(rivals))
-    return Watched(fitted, mismatch, careful, testimony(*careful, _missed(fitted, after)))
+    hidden = {name for t in found for name in t.candidate.hides}
+    lost = hidden | set(testimony(*careful, _missed(fitted, after)))
+    return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
 
 
 def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:
