@@ -343,13 +343,17 @@ def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
     if mismatch.verdict == "none" or not fitted.problem.runs or ideal.careful is not None:
         return ideal
     notify("fitting short pieces, each channel weighed by its residual", 0.7)
-    point = fitted.evaluation.point
+    points = [fitted.evaluation.point]
     if fitted.guess is not None and misfit(fitted.evaluation) > HOPELESS_SQUARE:
         # A model that lacks much bends everything to swallow it: start again from where nothing is bent
-        point = fitted.guess
-    pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
-    careful = solve_cautiously(pieces, start)
-    again = evaluate(pieces, careful[1].point)
+        points.insert(0, fitted.guess)
+    for point in points:
+        pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
+        careful = solve_cautiously(pieces, start)
+        again = evaluate(pieces, careful[1].point)
+        if again is not None and misfit(again) <= misfit(fitted.evaluation):
+            # Pieces fit no worse than the whole: the way from there did not get lost
+            break
     if again is not None and misfit(again) < HOPELESS_SQUARE < misfit(fitted.evaluation):
         # Short pieces fit: it was the way to the whole run's fit that failed, not the model
         notify("fitting whole runs again", 0.9)
