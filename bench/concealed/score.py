@@ -120,6 +120,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default=None,
         help="score so many, by seed: where time ended the examination",
     )
+    parser.add_argument(
+        "--skip", type=int, default=0, help="leave out so many first: sessions that were opened before"
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder for concealed.json and concealed.md")
     options = parser.parse_args(arguments)
     try:
@@ -128,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             digest, truths = open_sealed(options.truths, options.digests)
         reasons = json.loads(options.reasons.read_text(encoding="utf-8")) if options.reasons else {}
-        truths = truths[: options.first]
+        truths = truths[options.skip :][: options.first]
         marks = score(truths, options.sessions, options.results, reasons, sealed=digest is not None)
     except (InputError, OSError) as error:
         print(f"score: {error}", file=sys.stderr)
