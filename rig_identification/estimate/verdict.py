@@ -97,6 +97,11 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
     return out
 
 
+#: Variance, in parts of what both claim, by which a held-out run's parameters may differ and the model still
+#: be called an approximation: three standard deviations, beyond which nothing is ordinary.
+APPROXIMATE = 9.0
+
+
 @dataclass(frozen=True)
 class Heard:
     """What every run says of a fit."""
@@ -117,6 +122,21 @@ class Heard:
         """Held-out runs that ask for other parameters."""
         return [d for d in self.departures if self.unlikely(d.log10_p)]
 
+    @property
+    def contradicted(self) -> bool:
+        """Whether a held-out run asks for parameters so far off that the model is none of the rig."""
+        return any(d.excess > APPROXIMATE for d in self.contradicting())
+
+    @property
+    def looseness(self) -> float:
+        """How many times too much a fit claims to know: 1 where its residuals are noise.
+
+        The largest power of a band that is not noise, in units of white noise, or the variance of what
+        held-out runs ask for beyond their fit's, whichever is larger.
+        """
+        loud = [w.band.power for w in self.witnesses if self.unlikely(w.band.log10_p)]
+        return max([1.0, *loud, *(d.excess for d in self.contradicting())])
+
 
 def hear(fitted: Fitted) -> Heard:
     """Band powers of every channel of every run, fitted and held out; what held-out runs ask for."""
@@ -132,27 +152,6 @@ def hear(fitted: Fitted) -> Heard:
             witnesses += residual_witnesses(run, full, predictive_residual(shared, full))
             departures.append(departure(run.recording.name, shared, full))
     return Heard(witnesses, departures)
-
-
-#: Variance, in parts of what both claim, by which a held-out run's parameters may differ and the model still
-#: be called an approximation: three standard deviations, beyond which nothing is ordinary.
-APPROXIMATE = 9.0
-
-
-def contradicted(fitted: Fitted) -> bool:
-    """Whether a held-out run asks for parameters so far off that the model in the fit is none of the rig."""
-    return any(d.excess > APPROXIMATE for d in hear(fitted).contradicting())
-
-
-def looseness(fitted: Fitted) -> float:
-    """How many times too much a fit claims to know: 1 where its residuals are noise.
-
-    The largest power of a band that is not noise, in units of white noise, or the variance of what held-out
-    runs ask for beyond their fit's, whichever is larger.
-    """
-    heard = hear(fitted)
-    loud = [w.band.power for w in heard.witnesses if heard.unlikely(w.band.log10_p)]
-    return max([1.0, *loud, *(d.excess for d in heard.contradicting())])
 
 
 def weighed_otherwise(fitted: Fitted) -> str | None:

@@ -19,7 +19,7 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
-from rig_identification.estimate.verdict import contradicted, looseness, weighed_otherwise
+from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding, rival
@@ -221,8 +221,9 @@ def _fitted_whole(
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand
     trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None
-    trace = trace and only_a_trace(ideal.fitted, fitted) and not contradicted(fitted)
-    loose = looseness(fitted) if trace else 1.0
+    heard = hear(fitted) if trace and only_a_trace(ideal.fitted, fitted) else None
+    trace = heard is not None and not heard.contradicted
+    loose = heard.looseness if heard is not None and trace else 1.0
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = ", ".join(f.effect for f in findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
@@ -282,7 +283,7 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
     convincing = convincing and best is not None and misfit(best.fitted.evaluation) < WRONG
-    if convincing and best is not None and not contradicted(best.fitted):
+    if convincing and best is not None and not hear(best.fitted).contradicted:
         kept: tuple[Finding, ...] = best.mismatch.findings
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:
@@ -303,7 +304,7 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
     # Far from the noise the cautious fit knows by itself how little it knows
-    loose = looseness(ideal.fitted) if near_noise(ideal.fitted) else 1.0
+    loose = hear(ideal.fitted).looseness if near_noise(ideal.fitted) else 1.0
     return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, loose)
 
 

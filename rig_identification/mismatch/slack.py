@@ -17,7 +17,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, Start, fit_from, judged, near_noise, with_pieces
 from rig_identification.estimate.launch import launch_state
-from rig_identification.estimate.verdict import looseness
+from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.result import Finding, Mismatch
 
@@ -179,5 +179,5 @@ def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained
         text = f"Where every cable pulls a trace is left. {errors} {mismatch.explanation}"
         fitted = found.ideal.fitted
         mismatch = Mismatch("explained", text, (), mismatch.alternatives)
-        found = replace(found, fitted=fitted, loose=max(found.loose, looseness(fitted)))
+        found = replace(found, fitted=fitted, loose=max(found.loose, hear(fitted).looseness))
     return replace(found, mismatch=replace(mismatch, findings=(slack, *mismatch.findings)))
