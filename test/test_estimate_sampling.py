@@ -14,7 +14,7 @@ from rig_identification.estimate.sampling import (
     interpolation,
     jumps_of,
     node_values,
-    rate_of_change,
+    rates_of_change,
     sample_noise_std,
 )
 
@@ -94,12 +94,14 @@ def test_node_values_keep_the_motion_and_average_the_noise() -> None:
     np.testing.assert_allclose(node_values(grid, time, force(time) + noise), clean + noisy, atol=1e-10)
 
 
-def test_rate_of_change_of_a_swing() -> None:
+def test_rates_of_change_of_a_swing() -> None:
     grid = Grid(0.005, 2001)
     at = grid.step * np.arange(grid.nodes)[:, None]
-    rate = rate_of_change(grid, np.sin(2.0 * np.pi * 1.0 * at))
+    rate, bend = rates_of_change(grid, np.sin(2.0 * np.pi * 1.0 * at))
     expected = 2.0 * np.pi * np.cos(2.0 * np.pi * at)
-    np.testing.assert_allclose(rate[20:-20], expected[20:-20], atol=0.01 * 2.0 * np.pi)
+    np.testing.assert_allclose(rate[20:-20], expected[20:-20], atol=0.001 * 2.0 * np.pi)
+    expected = -((2.0 * np.pi) ** 2) * np.sin(2.0 * np.pi * at)
+    np.testing.assert_allclose(bend[20:-20], expected[20:-20], atol=0.002 * (2.0 * np.pi) ** 2)
 
 
 @pytest.mark.parametrize("std", [1e-4, 0.5, 20.0])

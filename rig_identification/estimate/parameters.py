@@ -52,6 +52,7 @@ class Parameter:
     bounded: bool = True  # the ideal model keeps it within a few of its prior std
     also: tuple[int, ...] = ()  # further entries that hold the same number
     ratio: bool = False  # positive: prior_std is that of its logarithm about the nominal's
+    freed: bool = False  # a doubt of the ideal model that is believed no longer
 
     def value(self, position: float) -> float:
         """The number at ``position`` (units of the prior's std) of the optimiser's vector."""
@@ -104,7 +105,7 @@ class DeviceLayout:
     @property
     def size(self) -> int:
         """Length of the flat array."""
-        return self.lag("mocap") + 1
+        return self.lag("exciter") + 1
 
     def clock(self, device: str) -> int:
         """Entry of a device's clock offset."""
@@ -118,10 +119,12 @@ class DeviceLayout:
 
     def lag(self, device: str) -> int:
         """Entry of a device's time constant (s) as a first-order low-pass."""
-        order = (*self.cables, "imu", "inclinometer", "mocap")
+        order = (*self.cables, "imu", "inclinometer", "mocap", "exciter")
         return self.exciter_clock + 1 + len(self.cables) + order.index(device)
 
 
+#: What shifts the exciter's force in time, alike to first order (prediction.drive).
+EXCITER_TIMES = ("exciter.clock", "exciter.lag")
 #: A mount that the description leaves out: position within 10 m, orientation within 1.5 rad.
 UNKNOWN_POSITION = 10.0
 UNKNOWN_ROTATION = 1.5
@@ -291,7 +294,7 @@ class ParameterSet:
         moved |= {entry for p in self.free if p.kind == "physics" for entry in (p.index, *p.also)}
         if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
             moved.add(layout.GRAVITY + 2)
-        clock = [EXCITER_CLOCK] if any(p.name == "exciter.clock" for p in self.free) else []
+        clock = [EXCITER_CLOCK] if any(p.name in EXCITER_TIMES for p in self.free) else []
         return np.array(sorted(moved) + clock, dtype=np.int64)
 
     def physics_jacobian(self, theta: Array) -> Array:
@@ -310,7 +313,7 @@ class ParameterSet:
                 if layout.GRAVITY <= p.index < layout.GRAVITY + 2:
                     slope = -physics[p.index] / physics[layout.GRAVITY + 2]
                     out[row_of[layout.GRAVITY + 2], column] = p.prior_std * slope
-            elif p.name == "exciter.clock":
+            elif p.name in EXCITER_TIMES:
                 out[row_of[EXCITER_CLOCK], column] = p.prior_std
         return out
 

@@ -159,13 +159,21 @@ class NodeInput:
     values: Array  # (nodes, w) at the nodes
     middle: Array  # (nodes, w) midway to the next node, beyond the mean of both
     rate: Array  # (nodes, w) per s, smoothed
+    bend: Array  # (nodes, w) per s^2, smoothed
     jumps: Array  # (nodes, w) see jumps_of
     doubt: Array  # (nodes,) variance of each component over an interval that was not sampled
 
     def between(self, first: int, last: int) -> NodeInput:
         """The input at nodes ``first`` to ``last``."""
         cut = slice(first, last + 1)
-        return NodeInput(self.values[cut], self.middle[cut], self.rate[cut], self.jumps[cut], self.doubt[cut])
+        return NodeInput(
+            self.values[cut],
+            self.middle[cut],
+            self.rate[cut],
+            self.bend[cut],
+            self.jumps[cut],
+            self.doubt[cut],
+        )
 
 
 def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInput:
@@ -178,9 +186,9 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     """
     line = node_values(grid, time, values)
     jumps = jumps_of(line, noise)
-    rate = rate_of_change(grid, line)
+    rate, bend = rates_of_change(grid, line)
     if grid.nodes < 5:
-        return NodeInput(line, np.zeros_like(line), rate, jumps, np.zeros(grid.nodes))
+        return NodeInput(line, np.zeros_like(line), rate, bend, jumps, np.zeros(grid.nodes))
     rough = np.any(jumps != 0.0, axis=1)[:, None]
     rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
     curved = np.zeros_like(line)
@@ -192,12 +200,19 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     smooth = np.where(rough, line, line - over * curved)
     middle = np.zeros_like(line)
     middle[1:-2] = (smooth[1:-2] + smooth[2:-1] - smooth[:-3] - smooth[3:]) / 16.0
-    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, jumps, np.zeros(grid.nodes))
+    return NodeInput(smooth, np.where(rough, 0.0, middle), rate, bend, jumps, np.zeros(grid.nodes))
 
 
-def rate_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> Array:
-    """(nodes, w) time derivative of a noisy input, smoothed over ``smoothing`` seconds."""
-    return np.asarray(np.gradient(gaussian_filter1d(nodes, smoothing / grid.step, axis=0), grid.step, axis=0))
+def rates_of_change(grid: Grid, nodes: Array, smoothing: float = 0.015) -> tuple[Array, Array]:
+    """(nodes, w) first and second time derivative of a noisy input, smoothed over ``smoothing`` seconds.
+
+    What a Gaussian takes off is put back once (Tukey's twicing): of 1.8 % at 2 Hz, which a clock's offset
+    would be wrong by, 0.03 % stays.
+    """
+    once = gaussian_filter1d(nodes, smoothing / grid.step, axis=0)
+    twice = 2.0 * once - gaussian_filter1d(once, smoothing / grid.step, axis=0)
+    rate = np.gradient(twice, grid.step, axis=0)
+    return np.asarray(rate), np.asarray(np.gradient(rate, grid.step, axis=0))
 
 
 #: Frequencies over which a spectrum is averaged, Hz.

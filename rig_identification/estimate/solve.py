@@ -333,8 +333,26 @@ EASED, BRAKED = 0.2, 5.0
 PATIENCE, QUICK = 3.0, 0.3
 #: Damped steps of so little gain, one after the other, that end a fit as well.
 IDLE = 2
+#: Part of a cost that is rounding.
+ROUNDING = 1e-9
 #: Gain (nats) of a step that gets nowhere, and how many of them in a row end a fit.
 CREEP, CREPT = 0.01, 4
+
+
+#: Gain (nats) that a full step may still promise where no step keeps it: the optimum is then within half a
+#: standard deviation.
+CLOSE = 0.1
+
+
+def _as_good_as_settled(problem: Problem, current: Evaluation) -> bool:
+    """Whether a fit that gets nowhere any more is where it should be.
+
+    The residuals' spreads depend on the parameters as well, and that slope is not in the Jacobian: at
+    the best point it and the residuals' own balance, and a full step promises a little for ever.
+    """
+    change = _bounded_step(problem, current, 0.0)
+    gain = float(change @ current.gradient - 0.5 * change @ current.information @ change)
+    return gain < CLOSE and not on_plateau(current)
 
 
 def excess(evaluation: Evaluation) -> float:
@@ -384,7 +402,7 @@ def solve(
         turned_back = False
         while True:
             if spent > PATIENCE * iterations:
-                return current, False
+                return current, _as_good_as_settled(problem, current)
             # About as little damping failed last
             wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
@@ -397,20 +415,20 @@ def solve(
             if wary and bends:
                 change = _along_valley(problem, current, damping, change)
                 spent += 2.0 * QUICK
-            moved = _moved(problem, current, change)
+            moved, allowed = _moved(problem, current, change), current.cost + ROUNDING * abs(current.cost)
             trial = evaluate(problem, moved, residuals_only=True) if wary else None
             spent += QUICK if wary else 0.0
-            if not wary or (trial is not None and trial.cost < current.cost):
+            if not wary or (trial is not None and trial.cost < allowed):
                 trial = evaluate(problem, moved)
                 spent += 1.0
-            if trial is not None and trial.cost < current.cost + 1e-9 * abs(current.cost):
+            if trial is not None and trial.cost < allowed:
                 if damping <= failed:
                     failed = 0.0
                 damping = damping if turned_back else max(damping * EASED, 1e-9)
                 won, current = current.cost - trial.cost, trial
                 creeping = creeping + 1 if won < CREEP else 0
                 if creeping == CREPT:
-                    return current, False
+                    return current, _as_good_as_settled(problem, current)
                 idle = idle + 1 if max(won, tolerance) < polish * excess(current) else 0
                 if idle and (damping <= 1e-3 or idle == IDLE):
                     return current, damping <= 1e-3 and not on_plateau(current)
@@ -418,7 +436,7 @@ def solve(
             failed, turned_back = max(failed, damping), True
             damping = max(damping, 1e-6) * BRAKED
             if damping > 1e6:
-                return current, False
+                return current, _as_good_as_settled(problem, current)
         if notify is not None:
             notify(iteration, current.cost)
     return current, False

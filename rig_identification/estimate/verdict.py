@@ -66,6 +66,8 @@ def predictive_residual(shared: Array, full: Linearised) -> Array:
 
 #: How many explanations a search would have: a doubt beyond what is ordinary has to stand out among them all.
 HYPOTHESES = 250
+#: How many times as likely as another hypothesis a tolerance that is exceeded counts.
+DOUBTED = 8.0
 #: Std of a doubt that is let go, in tolerances: next to no belief.
 LET_GO = 100.0
 
@@ -80,7 +82,7 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
     """
     parameters, evaluation = fitted.problem.bench.parameters, fitted.evaluation
     theta, gradient, information = evaluation.point.theta, evaluation.gradient, evaluation.information
-    limit = 0.5 * float(chi2.isf(FALSE_ALARM / max(HYPOTHESES, len(parameters.free)), 1))
+    limit = 0.5 * float(chi2.isf(DOUBTED * FALSE_ALARM / max(HYPOTHESES, len(parameters.free)), 1))
     doubts = [i for i, p in enumerate(parameters.free, start=INERTIAL) if p.bounded and not p.ratio]
     held = {i for i in doubts if abs(theta[i]) >= ordinary * (1.0 - 1e-6) and theta[i] * gradient[i] > 0.0}
     out = set()

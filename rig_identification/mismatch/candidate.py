@@ -35,6 +35,11 @@ class Candidate:
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property
+    def doubted(self) -> bool:
+        """Whether the lab doubts these numbers itself: nothing is added to the model."""
+        return all(p.freed for p in self.parameters)
+
+    @property
     def label(self) -> str:
         """Short name for progress and notes."""
         place = " ".join(str(v) for v in self.where.values() if isinstance(v, str))

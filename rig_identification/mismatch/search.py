@@ -17,8 +17,10 @@ from scipy.stats import chi2
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
+from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH, far_promises, supports
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of, find_liar
@@ -31,8 +33,6 @@ from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, fini
 
 Notify = Callable[[str], None]
 
-#: Chance that a session without any effect shows one, over all hypotheses together.
-FALSE_ALARM = 0.005
 #: Hypotheses that get their first steps after each screening, and that get to their end.
 FITTED, FINISHED = 4, 3
 #: Of these, at most so many of one effect: its other places are its rivals anyway.
@@ -68,7 +68,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
         parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0]
     )
     return [
-        *sensor_errors(rig, parameters, [d for d in devices_of(problem) if d != "exciter"]),
+        *sensor_errors(rig, parameters, devices_of(problem)),
         *rig_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]
@@ -80,8 +80,13 @@ def count_of(candidates: list[Candidate]) -> int:
 
 
 def needed_gain(candidate: Candidate, count: int) -> float:
-    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks, Bonferroni)."""
-    return 0.5 * float(chi2.isf(FALSE_ALARM / count, len(candidate.parameters)))
+    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks).
+
+    Bonferroni's correction, weighted (Genovese, Roeder and Wasserman, Biometrika 93, 2006): what the lab
+    doubts itself is likelier wrong than what it leaves out.
+    """
+    weight = DOUBTED if candidate.doubted else 1.0
+    return 0.5 * float(chi2.isf(weight * FALSE_ALARM / count, len(candidate.parameters)))
 
 
 def worst_pieces(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
@@ -182,7 +187,13 @@ def trials(
     if not tried:
         return Trials([], device)
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
-    tried.sort(key=lambda t: -t.evidence)
+
+    def fair(trial: Trial) -> Trial:
+        """Near the noise: less what the trial only gains from the noise."""
+        less = 0.0 if far else unearned(here, seen, trial.problem, trial.evaluation)
+        return replace(trial, evidence=log_evidence(trial.evaluation) - less)
+
+    tried = sorted((fair(t) for t in tried), key=lambda t: -t.evidence)
     done: list[Trial] = []
     beaten: list[Trial] = []
     for trial in tried:
@@ -191,7 +202,10 @@ def trials(
             continue
         notify(trial.candidate.label)
         ended = finished(trial)
-        if ended is not None and ended.evidence > needed and beyond_doubt(ended, ordinary, limit):
+        if ended is None or not beyond_doubt(ended, ordinary, limit):
+            continue
+        ended = fair(ended)
+        if ended.evidence > needed:
             (beaten if last else done).append(ended)
     return Trials(told_apart(done, MEANT), device, tuple(beaten))
 

@@ -30,9 +30,8 @@ def freed(parameters: ParameterSet, name: str, std: float) -> Parameter | None:
     """A free parameter with the wide prior; None where the session has it not."""
     for p in parameters.free:
         if p.name == name:
-            return Parameter(
-                name, p.unit, p.nominal, max(std, 10.0 * p.prior_std), p.kind, p.index, bounded=False
-            )
+            wide = max(std, 10.0 * p.prior_std)
+            return Parameter(name, p.unit, p.nominal, wide, p.kind, p.index, bounded=False, freed=True)
     return None
 
 
