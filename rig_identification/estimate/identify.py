@@ -364,6 +364,18 @@ def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
     return Ideal(fitted, found, mismatch, pieces, careful)
 
 
+def fit_again(ideal: Ideal, runs: tuple[Run, ...], held: tuple[Run, ...], notify: Progress) -> Ideal:
+    """The ideal model fitted to other stretches of its session's runs, from where nothing is bent."""
+    fitted = ideal.fitted
+    problem = replace(fitted.problem, runs=runs)
+    point = fitted.guess or fitted.evaluation.point
+    starts = tuple(launch_state(problem.bench, run, point.theta, fitted.rest) for run in runs)
+    start = Start(problem, replace(point, starts=starts), fitted.rest, held, fitted.notes, fitted.held_parts)
+    again = fit_from(start, notify)
+    found = Ideal(again, *judged(again))
+    return found if near_noise(again) else with_pieces(found, notify)
+
+
 def judged(fitted: Fitted) -> tuple[Scores, Mismatch]:
     """Errors of a fit, and whether the model in it explains the session."""
     found = scores(fitted)

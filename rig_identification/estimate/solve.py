@@ -433,6 +433,8 @@ def solve(
                 if idle and (damping <= 1e-3 or idle == IDLE):
                     return current, damping <= 1e-3 and not on_plateau(current)
                 break
+            if gain < CLOSE and damping <= 1e-3:
+                return current, not on_plateau(current)
             failed, turned_back = max(failed, damping), True
             damping = max(damping, 1e-6) * BRAKED
             if damping > 1e6:

@@ -23,8 +23,8 @@ from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding, rival
-from rig_identification.mismatch.push import without_push
-from rig_identification.mismatch.screen import carried, extended, screen, with_reference
+from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
+from rig_identification.mismatch.screen import Promise, carried, extended, screen, with_reference
 from rig_identification.mismatch.search import (
     AT_NOISE,
     CHIEF,
@@ -65,6 +65,7 @@ class _Search:
     found: list[Trial] = field(default_factory=list)
     rivals: list[dict[str, object]] = field(default_factory=list)
     liar: str | None = None
+    screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
 
     @property
     def whole(self) -> bool:
@@ -105,7 +106,8 @@ def _hidden(ideal: Ideal, notify: Notify) -> Explained | None:
     promises = screen(problem, fitted.evaluation, candidates, mass_of(problem, fitted.evaluation))
     if not worth_a_fit(promises, count_of(candidates)):
         return None
-    best = _named(ideal, _Search(problem, problem, fitted.evaluation, excess(fitted.evaluation)), notify)
+    search = _Search(problem, problem, fitted.evaluation, excess(fitted.evaluation), screened=promises)
+    best = _named(ideal, search, notify)
     return best if best is not None and best.mismatch.verdict == "explained" and not best.trace else None
 
 
@@ -126,10 +128,24 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
     pushed = None if search.whole else without_push(ideal, problem, here, evaluation, notify)
     if pushed is not None:
         return pushed
+    beside = None if search.whole else _beside_push(ideal, here, evaluation, notify)
+    if beside is not None:
+        return beside
     best = _named(ideal, search, notify)
     if best is not None and best.mismatch.verdict == "explained":
         return best
     return _unexplained(ideal, search, best, notify)
+
+
+def _beside_push(ideal: Ideal, here: Problem, evaluation: Evaluation, notify: Notify) -> Explained | None:
+    """What explains the session outside a push; None where nothing pushes, or nothing explains the rest."""
+    event = push_beside(here, evaluation, notify)
+    if event is None:
+        return None
+    found = _explain(outside(ideal, event, notify), notify)
+    if found is None or found.mismatch.verdict != "explained":
+        return None
+    return with_push(found, ideal, here, event)
 
 
 def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
@@ -146,7 +162,9 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
             left,
             ORDINARY,
             lambda label, at=at: notify(f"search: {label}", at),  # type: ignore[misc]
+            search.screened,
         )
+        search.screened = None
         search.liar = search.liar or tried.liar
         if not tried.done:
             break
@@ -218,6 +236,8 @@ def _fitted_whole(
     whole = extended(search.problem, tuple(t.candidate for t in found))
     point = replace(known, theta=carried(whole, here, known).theta)
     fitted = fit_whole(ideal.fitted, whole, here, point)
+    # What says most comes first, whatever was found first
+    found = sorted(found, key=lambda t: -strength(_at(fitted, t)))
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand
     trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None
@@ -237,13 +257,18 @@ def _fitted_whole(
     return Explained(fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace)
 
 
+def _at(fitted: Fitted, trial: Trial) -> Trial:
+    """A trial whose effect is in a fit's model, as that fit has it."""
+    return replace(trial, problem=fitted.problem, evaluation=fitted.evaluation)
+
+
 def _pruned(best: Explained, search: _Search, count: int) -> Explained:
     """The explanation less what it can do without: an early effect may only have stood in for a later one."""
     kept = list(search.found)
     ordinary = {p.name: p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
     while len(kept) > 1:
         fitted = best.fitted
-        here = [replace(t, problem=fitted.problem, evaluation=fitted.evaluation) for t in kept]
+        here = [_at(fitted, t) for t in kept]
         strengths = [
             strength(t) / needed_gain(t.candidate, count) if beyond_doubt(t, ordinary, ORDINARY) else 0.0
             for t in here

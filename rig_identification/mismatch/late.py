@@ -1,8 +1,8 @@
 """A clock that is off beside a device that follows slowly: alike to first order.
 
-A first-order lag predicts the device's reading from a smoothed motion, and smoothing the noise of the exciter's
-force predicts better whatever the device does (in_motion.py). Only what is gained where the body moves
-tells a lag from a clock.
+A first-order lag predicts the device's reading from a smoothed motion, and smoothing the noise of the
+exciter's force predicts better whatever the device does (in_motion.py). Only what is gained where the body
+moves tells a lag from a clock.
 """
 
 from __future__ import annotations

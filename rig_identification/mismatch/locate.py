@@ -132,8 +132,12 @@ EVENT_CONTRAST = 3.0
 CALM = 1.15
 
 
-def find_event(problem: Problem, evaluation: Evaluation) -> Event | None:
-    """Pieces that alone cannot be fitted, next to each other in one run; None where there are no such."""
+def find_event(problem: Problem, evaluation: Evaluation, alone: bool = True) -> Event | None:
+    """Pieces that cannot be fitted, next to each other in one run; None where there are no such.
+
+    alone: all other pieces are explained. Otherwise something else is wrong in these, alike in all of
+    them, before the event and after it.
+    """
     count = len(problem.runs)
     if count < 4:
         return None
@@ -142,7 +146,7 @@ def find_event(problem: Problem, evaluation: Evaluation) -> Event | None:
     calm_problem = replace(problem, runs=tuple(problem.runs[i] for i in keep))
     calm_point = replace(evaluation.point, starts=tuple(evaluation.point.starts[i] for i in keep), latents=())
     fitted, _ = solve(calm_problem, calm_point, iterations=10, tolerance=0.5)
-    if misfit(fitted) > CALM:
+    if alone and misfit(fitted) > CALM:
         return None
     starts = list(evaluation.point.starts)
     for i, start in zip(keep, fitted.point.starts, strict=True):
@@ -154,10 +158,15 @@ def find_event(problem: Problem, evaluation: Evaluation) -> Event | None:
     if whole is None:
         return None
     squares = np.array([float(np.mean(run.residual**2)) for run in whole.runs])
-    bad = [i for i in range(count) if squares[i] > EVENT_CONTRAST * CALM]
+    usual = CALM if alone else max(CALM, float(np.max(squares[keep])))
+    bad = [i for i in range(count) if squares[i] > EVENT_CONTRAST * usual]
     names = {problem.runs[i].recording.name for i in bad}
     if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
         return None
     first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
+    within = [i for i in range(count) if problem.runs[i].recording.name in names]
+    if not alone and (bad[0] == within[0] or bad[-1] == within[-1]):
+        # What is large at first and dies away, or grows, is no event
+        return None
     calm = tuple(i for i in range(count) if i not in bad)
     return Event(names.pop(), first.offset, last.offset + last.grid.duration, point, calm)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.identify import Ideal, judged
+from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
@@ -54,6 +54,36 @@ def without_push(
     evidence = evidence_of(ideal, fitted, after.holdout)
     text = f"Outside the push every residual is noise. {held_out_errors(ideal.scores.holdout, after.holdout)}"
     return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
+
+
+def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event | None:
+    """A push beside something else that is wrong all the time."""
+    squares = [float(np.mean(run.residual**2)) for run in evaluation.runs]
+    if max(squares) < UNEVEN * float(np.median(squares)):
+        return None
+    notify("search: a push beside something else", 0.06)
+    return find_event(here, evaluation, alone=False)
+
+
+def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
+    """The ideal model fitted to all but the pieces that an event disturbs."""
+    fitted = ideal.fitted
+    runs = tuple(p for run in fitted.problem.runs for p in _without(run, event, event.start, event.end))
+    return fit_again(ideal, runs, fitted.holdout_runs, notify)
+
+
+def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Explained | None:
+    """What was found outside a push, and the push as the model found there sees it; None where it is none."""
+    fitted = found.fitted
+    evaluation = fitted.evaluation
+    pieces = replace(here, bench=fitted.problem.bench)
+    told = push_finding(pieces, evaluation, fitted.rest, mass_of(pieces, evaluation), event)
+    if told is None:
+        return None
+    after = judged(fitted)[0].holdout
+    push = replace(told[0], evidence=evidence_of(ideal, fitted, after))
+    mismatch = replace(found.mismatch, findings=(*found.mismatch.findings, push))
+    return replace(found, mismatch=mismatch)
 
 
 def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import SWINGS, WIDTH, middle_of, rider_candidate, rider_wrenches
 from rig_identification.mismatch.supports import (
@@ -190,8 +192,10 @@ def _riders(
     total = full.information.shape[0]
     cross, own, gradient = np.zeros((total, count)), np.zeros((len(SWINGS), WIDTH, WIDTH)), np.zeros(count)
     place_ = size
+    responses = []
     for i, run in enumerate(full.runs):
         columns = whitened_response(run, wrenches[i])
+        responses.append(columns)
         starts = run.jacobian.shape[1] - size
         rows = np.concatenate([np.arange(size), np.arange(place_, place_ + starts)])
         cross[rows] += run.jacobian.T @ columns
@@ -212,6 +216,7 @@ def _riders(
     about = np.eye(WIDTH)
     about[1:, 0] = center
     best: dict[tuple[str, str], Promise] = {}
+    near = misfit(full) < NEAR_SQUARE
     for k, swing in enumerate(SWINGS):
         chosen = slice(WIDTH * k, WIDTH * (k + 1))
         matrix = about.T @ (own[k] - seen[:, chosen].T @ solved[:, chosen]) @ about
@@ -223,6 +228,13 @@ def _riders(
         step = np.linalg.lstsq(matrix + prior, right, rcond=1e-12)[0]
         gain = 0.5 * float(step @ right)
         kind = swing.effect, swing.directions
+        if step[0] > 0.0 and near and (kind not in best or gain > best[kind].gain):
+            amounts = about @ step
+            own_part = scale * cho_solve(factor, scale * full.gradient[base] - seen[:, chosen] @ amounts)
+            moved = np.zeros(total)
+            moved[base] = own_part
+            residuals = _left(full, size, moved, [r[:, chosen] @ amounts for r in responses])
+            gain -= unearned_of(problem, full, full.runs, residuals)
         if step[0] <= 0.0 or (kind in best and gain <= best[kind].gain):
             continue
         at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
@@ -232,6 +244,16 @@ def _riders(
     # Blows against stops look like nothing else: where what swings smoothly promises more nothing is loose,
     # and the slowest fit of all is saved
     return [p for (effect, _), p in best.items() if effect != "loose_mass" or p.gain > swinging]
+
+
+def _left(full: Evaluation, size: int, step: Array, taken: list[Array]) -> list[Array]:
+    """Residuals of all runs after a ``step`` of all unknowns, less what else takes away, to first order."""
+    out, place_ = [], size
+    for run, less in zip(full.runs, taken, strict=True):
+        end = place_ + run.jacobian.shape[1] - size
+        out.append(run.residual - run.jacobian @ np.concatenate([step[:size], step[place_:end]]) - less)
+        place_ = end
+    return out
 
 
 def _solve(information: Array, gradient: Array) -> Array:

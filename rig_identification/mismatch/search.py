@@ -139,21 +139,26 @@ class Trials:
 
 
 def trials(
-    problem: Problem, evaluation: Evaluation, candidates: list[Candidate], limit: float, notify: Notify
+    problem: Problem,
+    evaluation: Evaluation,
+    candidates: list[Candidate],
+    limit: float,
+    notify: Notify,
+    screened: list[Promise] | None = None,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
     All get a few steps; the best few go on to their end, and where one reaches the noise only those
     that had come as close. Where much is left and no hypothesis takes it away that promised to, first order
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
-    tried whatever screening says.
+    tried whatever screening says. screened: promises about this evaluation, where they are known.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
     if far:
         problem, evaluation = worst_pieces(problem, evaluation)
     count = count_of(candidates)
-    promises = screen(problem, evaluation, candidates, mass)
+    promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
     tried: list[Trial] = []
     if not far or (promises and promises[0].share > DIRECT):
@@ -190,7 +195,7 @@ def trials(
 
     def fair(trial: Trial) -> Trial:
         """Near the noise: less what the trial only gains from the noise."""
-        less = 0.0 if far else unearned(here, seen, trial.problem, trial.evaluation)
+        less = 0.0 if far else unearned(here, seen, trial.evaluation.runs)
         return replace(trial, evidence=log_evidence(trial.evaluation) - less)
 
     tried = sorted((fair(t) for t in tried), key=lambda t: -t.evidence)

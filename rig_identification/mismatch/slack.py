@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.identify import Ideal, Start, fit_from, judged, near_noise, with_pieces
-from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.identify import Ideal, judged
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.result import Finding, Mismatch
@@ -156,13 +155,7 @@ def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | Non
     held = tuple(part for run in fitted.holdout_runs for part in taut_stretches(run, loose))
     if not runs:
         return None
-    problem = replace(fitted.problem, runs=runs)
-    point = fitted.guess or fitted.evaluation.point
-    starts = tuple(launch_state(problem.bench, run, point.theta, fitted.rest) for run in runs)
-    start = Start(problem, replace(point, starts=starts), fitted.rest, held, fitted.notes, fitted.held_parts)
-    again = fit_from(start, notify)
-    found = Ideal(again, *judged(again))
-    return found if near_noise(again) else with_pieces(found, notify)
+    return fit_again(ideal, runs, held, notify)
 
 
 def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
