@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.identify import Ideal, judged
+from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.result import Finding, Mismatch
