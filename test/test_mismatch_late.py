@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
-from rig_identification.mismatch.late import cost_in_motion, told_apart
+from rig_identification.mismatch.in_motion import cost_in_motion, unearned
+from rig_identification.mismatch.late import told_apart
 
 SAMPLES, DURATION = 4000, 40.0
 
@@ -17,7 +19,7 @@ def _fit(residual):  # type: ignore[no-untyped-def]
     channel = SimpleNamespace(width=1)
     run = SimpleNamespace(channels=(channel,), grid=SimpleNamespace(duration=DURATION))
     rows = np.zeros(SAMPLES, dtype=int)
-    linearised = SimpleNamespace(residual=residual, channel=rows, axis=rows)
+    linearised = SimpleNamespace(residual=residual, channel=rows, axis=rows, log_spread=0.0)
     return SimpleNamespace(runs=(run,)), SimpleNamespace(runs=(linearised,))
 
 
@@ -36,9 +38,30 @@ def _trial(effect: str, residual, evidence: float) -> _Trial:  # type: ignore[no
 def test_only_what_the_body_can_do_counts() -> None:
     time = np.arange(SAMPLES) * DURATION / SAMPLES
     slow, fast = np.sin(2 * np.pi * 1.0 * time), np.sin(2 * np.pi * 30.0 * time)
-    # A whole number of periods: half the sum of squares, less the first second
-    assert np.isclose(cost_in_motion(*_fit(slow)), 0.25 * SAMPLES * (1 - 1.0 / DURATION), rtol=1e-3)
+    # A whole number of periods: half the sum of squares, with and without the first second
+    assert np.isclose(cost_in_motion(*_fit(slow)), 0.25 * SAMPLES, rtol=1e-6)
+    without = cost_in_motion(*_fit(slow), settling=1.0)
+    assert np.isclose(without, 0.25 * SAMPLES * (1 - 1.0 / DURATION), rtol=1e-3)
     assert cost_in_motion(*_fit(fast)) < 1e-6 * SAMPLES
+
+
+def test_a_gain_from_noise_alone_is_not_earned() -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(SAMPLES) * DURATION / SAMPLES
+    swing = 0.5 * np.sin(2 * np.pi * 1.0 * time)
+    noise = rng.normal(size=SAMPLES)
+    noise *= np.sqrt(SAMPLES / np.sum(noise**2))
+    problem, before = _fit(noise + swing)
+    # What follows the body is earned, however much it is
+    assert unearned(problem, before, _fit(noise)[1].runs) < 1.0
+    # A tenth less of white noise is not, nor are spreads that shrink with it
+    calmer = _fit(0.9 * noise + swing)[1].runs
+    assert unearned(problem, before, calmer) == pytest.approx(0.5 * 0.19 * SAMPLES, rel=0.15)
+    calmer[0].log_spread = -200.0
+    assert unearned(problem, before, calmer) == pytest.approx(0.5 * 0.19 * SAMPLES + 200.0, rel=0.15)
+    # An excess at frequencies where nothing should move may be taken away
+    problem, loud = _fit(1.1 * noise)
+    assert unearned(problem, loud, _fit(noise)[1].runs) < 0.02 * SAMPLES
 
 
 def test_a_lag_that_only_smooths_noise_is_a_clock() -> None:

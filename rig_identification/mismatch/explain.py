@@ -131,10 +131,25 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
     beside = None if search.whole else _beside_push(ideal, here, evaluation, notify)
     if beside is not None:
         return beside
+    near = search.whole
     best = _named(ideal, search, notify)
     if best is not None and best.mismatch.verdict == "explained":
         return best
+    if near:
+        ideal = with_pieces(ideal, notify)
+        pushed = _gentle_push(ideal, problem, notify)
+        if pushed is not None:
+            return pushed
     return _unexplained(ideal, search, best, notify)
+
+
+def _gentle_push(ideal: Ideal, problem: Problem, notify: Notify) -> Explained | None:
+    """A push so gentle that whole runs come near the noise with it."""
+    if ideal.pieces is None or ideal.careful is None:
+        return None
+    here = with_reference(ideal.pieces, ideal.fitted.rest)
+    evaluation = evaluate(here, ideal.careful[1].point)
+    return None if evaluation is None else without_push(ideal, problem, here, evaluation, notify)
 
 
 def _beside_push(ideal: Ideal, here: Problem, evaluation: Evaluation, notify: Notify) -> Explained | None:

@@ -125,8 +125,10 @@ class Event:
     calm: tuple[int, ...]  # pieces that it leaves in peace
 
 
-#: An event may take up this share of the pieces, which fit so many times worse than the others.
+#: An event may take up this share of the pieces. It shows in them by so many standard deviations of a mean
+#: square beyond noise; beside something else, by so many times what that leaves.
 EVENT_SHARE = 0.4
+EVENT_SEEN = 6.0
 EVENT_CONTRAST = 3.0
 #: Mean square of the calm pieces' residuals up to which they count as explained.
 CALM = 1.15
@@ -158,8 +160,12 @@ def find_event(problem: Problem, evaluation: Evaluation, alone: bool = True) -> 
     if whole is None:
         return None
     squares = np.array([float(np.mean(run.residual**2)) for run in whole.runs])
-    usual = CALM if alone else max(CALM, float(np.max(squares[keep])))
-    bad = [i for i in range(count) if squares[i] > EVENT_CONTRAST * usual]
+    if alone:
+        sizes = np.array([run.residual.size for run in whole.runs])
+        limit = np.mean(squares[keep]) + EVENT_SEEN * np.sqrt(2.0 / sizes)
+    else:
+        limit = np.full(count, EVENT_CONTRAST * max(CALM, float(np.max(squares[keep]))))
+    bad = [i for i in range(count) if squares[i] > limit[i]]
     names = {problem.runs[i].recording.name for i in bad}
     if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
         return None

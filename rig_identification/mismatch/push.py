@@ -12,7 +12,7 @@ from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
-from rig_identification.mismatch.locate import Event, find_event
+from rig_identification.mismatch.locate import CALM, Event, find_event
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
 from rig_identification.result import Mismatch
@@ -33,7 +33,7 @@ def without_push(
     problem: whole runs. here, evaluation: their short pieces, fitted.
     """
     squares = [float(np.mean(run.residual**2)) for run in evaluation.runs]
-    if max(squares) < UNEVEN * float(np.median(squares)):
+    if max(squares) < UNEVEN * float(np.median(squares)) and np.median(squares) > CALM:
         return None
     notify("search: a push", 0.05)
     event = find_event(here, evaluation)

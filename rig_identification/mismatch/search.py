@@ -240,7 +240,7 @@ def begun(
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
-    reached, kept = 0.0, 0.0
+    reached, kept, done = 0.0, 0.0, False
     slow = gives_way(problem.bench.parameters.model)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
@@ -251,6 +251,9 @@ def begun(
             continue
         if not far and promise.gain < min(CLOSE * kept, kept - BEATEN):
             # Another hypothesis promised much more, near the noise, and kept it
+            continue
+        if not far and done and promise.candidate.build is not None and promise.gain < kept:
+            # Another one took away all there was: what changes the model, and promised less, is no likelier
             continue
         if far and promise.candidate.build is not None and promise.gain < CLOSE * reached:
             # Another hypothesis left nothing already, and much more was expected of it
@@ -263,6 +266,7 @@ def begun(
         if trial is not None:
             out.append(trial)
             kept = max(kept, min(promise.gain, evaluation.cost - trial.evaluation.cost))
+            done = done or excess(trial.evaluation) < BEATEN
             if far and _at_noise(trial):
                 reached = max(reached, promise.gain)
                 if promise is not worthy[0]:
