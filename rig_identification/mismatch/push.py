@@ -15,7 +15,7 @@ from rig_identification.mismatch.explained import Explained, evidence_of, held_o
 from rig_identification.mismatch.locate import CALM, Event, find_event
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
-from rig_identification.result import Mismatch
+from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
 
@@ -45,15 +45,32 @@ def without_push(
     if told is None:
         return None
     push, start, end = told
-    parts = tuple(part for run in problem.runs for part in _without(run, event, start, end))
-    whole = replace(problem, runs=parts)
-    fitted = fit_whole(ideal.fitted, whole, here, event.point)
-    after, verdict = judged(fitted)
-    if verdict.verdict != "none":
+    for first, last in ((start, end), (event.start, event.end)):
+        parts = tuple(part for run in problem.runs for part in _without(run, event, first, last))
+        whole = replace(problem, runs=parts)
+        fitted = fit_whole(ideal.fitted, whole, here, event.point)
+        after, verdict = judged(fitted)
+        if verdict.verdict == "none":
+            break
+    else:
         return None
+    if (first, last) != (start, end):
+        push = _gentle(push, event)
     evidence = evidence_of(ideal, fitted, after.holdout)
     text = f"Outside the push every residual is noise. {held_out_errors(ideal.scores.holdout, after.holdout)}"
     return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
+
+
+def _gentle(push: Finding, event: Event) -> Finding:
+    """A push too gentle for its moment and direction to be told: the pieces that it disturbs are left out."""
+    times = [{"recording": event.recording, "start": round(event.start, 3), "end": round(event.end, 3)}]
+    where: dict[str, object] = {"channel": None, "axis": None, "times": times}
+    text = (
+        f"Something pushes the body gently at some time from {event.start:.1f} to {event.end:.1f} s of "
+        f"{event.recording}; where and along what is not to be told. These seconds are left out of the fit. "
+        "Keep people and draughts away from the rig, or cut the recording there."
+    )
+    return replace(push, where=where, statement=text)
 
 
 def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event | None:
