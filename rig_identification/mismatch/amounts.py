@@ -36,6 +36,9 @@ WORTH = 0.05
 SINKS = (0.03, 0.7)
 #: Multiples of the usual stiffness of cables that are tried: thin wire to thick rope.
 STRETCHES = (0.1, 10.0)
+#: What takes energy out, and the parts of its prior's std that are tried.
+BRAKES = ("hinge_damping", "hinge_friction", "air_drag")
+BRAKED = (0.1, 10.0)
 #: Factor between two amounts, and where little is left.
 SPACED, FINELY = 3.2, 1.4
 
@@ -127,6 +130,21 @@ def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Prom
     return out
 
 
+def brakes(problem: Problem, evaluation: Evaluation, promises: list[Promise]) -> list[Promise]:
+    """What takes energy out, each scanned over its amount.
+
+    Much of it leaves no swing that first order could tell it by.
+    """
+    out = []
+    for p in promises:
+        if p.candidate.effect not in BRAKES:
+            continue
+        first = p.candidate.parameters[0]
+        amount = Amount(problem, evaluation, p.candidate, first.name)
+        out.append(amount.best(list(first.prior_std * _spread(BRAKED, SPACED))))
+    return [p for p in out if p.share > WORTH]
+
+
 def _spread(ends: tuple[float, float], spaced: float) -> Array:
     """Amounts from end to end, at most a factor of ``spaced`` apart."""
     count = int(np.ceil(np.log(ends[1] / ends[0]) / np.log(spaced))) + 1
@@ -140,6 +158,7 @@ def far_promises(
     if gives_way(problem.bench.parameters.model):
         return []
     out = [p for p in supports(problem, evaluation, mass) if p.share > WORTH]
+    out += brakes(problem, evaluation, promises)
     riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
     out += riders[:1]
     out += [p for p in promises if p.candidate.effect == "loose_mass"][:1]

@@ -20,8 +20,11 @@ from rig_identification.model.body import (
     six_elements,
 )
 from rig_identification.model.effects import place
+from rig_identification.model.motion import CREEP_RATE
 from rig_identification.rig import Rig
 
+#: Std of the logarithm of the rate at which dry hinges creep: a factor of three to either side.
+CREEP_SPREAD = 1.1
 #: Length (m) of a hose that pulls as hard as any would and resists sideways most.
 SHORT_HOSE = 1.0
 
@@ -92,6 +95,13 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     size = float(np.max(extent(rig)))
     speed = np.sqrt(rig.gravity * length)
     middle = np.mean([c.body_point for c in rig.cables], axis=0) - [0.0, 0.0, 0.3 * size]
+
+    def rubbing(values: dict[str, float], stds: dict[str, float]) -> Told:
+        return {
+            "torque": (values["hinge.friction"], stds["hinge.friction"], "N*m"),
+            "creep_rate": (values["hinge.creep"], stds["hinge.creep"], "rad/s"),
+        }
+
     out = [
         Candidate(
             "hinge_damping",
@@ -108,12 +118,17 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         ),
         Candidate(
             "hinge_friction",
-            (added("hinge.friction", "N*m", 0.003 * mass * rig.gravity / n, block + place.FRICTION),),
+            (
+                added("hinge.friction", "N*m", 0.003 * mass * rig.gravity / n, block + place.FRICTION),
+                replace(
+                    added("hinge.creep", "rad/s", CREEP_SPREAD, block + place.CREEP, CREEP_RATE), ratio=True
+                ),
+            ),
             "The cables' hinges rub: each holds against turning with {value}.",
             "Grease or replace the hinges; dry friction spoils small motions most.",
             {"channel": None, "axis": None},
             positive=1,
-            name_in_result="torque",
+            tell=rubbing,
         ),
         Candidate(
             "air_drag",

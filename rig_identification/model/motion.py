@@ -12,7 +12,7 @@ from rig_identification.model import layout
 from rig_identification.model.body import linear_from_elements
 from rig_identification.model.constraints import project_columns, project_state
 from rig_identification.model.effects.internal import STOP_FREQUENCY
-from rig_identification.model.effects.place import EFFECTS_SIZE, SHARING, internal_block
+from rig_identification.model.effects.place import CREEP, EFFECTS_SIZE, SHARING, internal_block
 from rig_identification.model.integrate import propagate
 from rig_identification.rig import Rig
 
@@ -78,6 +78,10 @@ def redundant(rig: Rig) -> bool:
     return bool(strengths[-1] < 1e-3 * strengths[0])
 
 
+#: Rate (rad/s) at which dry hinges are believed to creep.
+CREEP_RATE = 1e-3
+
+
 def rig_model(
     rig: Rig, elements: Array, *, axial_stiffness: float | None = None, rods: bool = False
 ) -> RigModel:
@@ -102,6 +106,7 @@ def rig_model(
         physics[o + layout.LENGTH] = cable.length
         physics[o + layout.CELL_AT_CEILING] = float(cable.load_cell == "ceiling")
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
+    physics[layout.effects_offset(n) + CREEP] = CREEP_RATE
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic

@@ -8,7 +8,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.effects.hinges import add_hinge_moments
-from rig_identification.model.effects.place import BENDING, active
+from rig_identification.model.effects.place import BENDING, CREEP, active
 
 
 @njit(cache=True)
@@ -16,4 +16,4 @@ def add_hinge_bending(physics, block, modes, x, R, r):  # type: ignore[no-untype
     """Add the force and moment of hinges that resist being bent to r."""
     damping = physics[block + BENDING]
     if active(damping):
-        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, 0.0, r)
+        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, physics[block + CREEP], 0.0, r)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.effects.hinges import add_hinge_moments
-from rig_identification.model.effects.place import DAMPING, active
+from rig_identification.model.effects.place import CREEP, DAMPING, active
 
 
 @njit(cache=True)
@@ -20,4 +20,4 @@ def add_hinge_damping(physics, block, modes, x, R, r):  # type: ignore[no-untype
     """Add the force and moment of viscous hinges to r."""
     damping = physics[block + DAMPING]
     if active(damping):
-        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, 1.0, r)
+        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, physics[block + CREEP], 1.0, r)

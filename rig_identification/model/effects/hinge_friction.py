@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.effects.hinges import add_hinge_moments
-from rig_identification.model.effects.place import FRICTION, active
+from rig_identification.model.effects.place import CREEP, FRICTION, active
 
 
 @njit(cache=True)
@@ -13,4 +13,4 @@ def add_hinge_friction(physics, block, modes, x, R, r):  # type: ignore[no-untyp
     """Add the force and moment of rubbing hinges to r."""
     torque = physics[block + FRICTION]
     if active(torque):
-        add_hinge_moments(physics, modes, x, R, 0.0 * torque, torque, 1.0, r)
+        add_hinge_moments(physics, modes, x, R, 0.0 * torque, torque, physics[block + CREEP], 1.0, r)

@@ -15,20 +15,18 @@ from rig_identification.model.layout import (
     VELOCITY,
 )
 
-#: Rate (rad/s) below which rubbing grows with the rate instead of jumping: dry bearings creep there.
-CREEP = 1e-3
-
 
 @njit(cache=True)
-def _law(viscous, rubbing, a, b, c):  # type: ignore[no-untyped-def]
+def _law(viscous, rubbing, creep, a, b, c):  # type: ignore[no-untyped-def]
     """Moment per unit of relative rate (a, b, c)."""
-    return viscous + rubbing * reciprocal(root(a * a + b * b + c * c + CREEP * CREEP))
+    return viscous + rubbing * reciprocal(root(a * a + b * b + c * c + creep * creep))
 
 
 @njit(cache=True)
-def add_hinge_moments(physics, modes, x, R, viscous, rubbing, twist, r):  # type: ignore[no-untyped-def]
+def add_hinge_moments(physics, modes, x, R, viscous, rubbing, creep, twist, r):  # type: ignore[no-untyped-def]
     """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in every hinge.
 
+    creep (rad/s): rate below which rubbing grows with the rate instead of jumping, as dry bearings do.
     twist: 1 where a hinge resists being twisted as it resists being bent, 0 where it twists freely.
     """
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
@@ -61,8 +59,8 @@ def add_hinge_moments(physics, modes, x, R, viscous, rubbing, twist, r):  # type
         off = spin - half
         ax, ay, az = ax - off * ex, ay - off * ey, az - off * ez
         ox, oy, oz = ox + half * ex, oy + half * ey, oz + half * ez
-        lower = _law(viscous, rubbing, ax, ay, az)
-        upper = _law(viscous, rubbing, ox, oy, oz)
+        lower = _law(viscous, rubbing, creep, ax, ay, az)
+        upper = _law(viscous, rubbing, creep, ox, oy, oz)
         # Net moment on the cable, then the force across it at the body's hinge
         mx, my, mz = lower * ax - upper * ox, lower * ay - upper * oy, lower * az - upper * oz
         fx = -(ey * mz - ez * my) * per_length

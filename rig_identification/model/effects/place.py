@@ -27,7 +27,8 @@ REFERENCE_POSITION = 19  # 3: m, world
 REFERENCE_ROTATION = 22  # 9: rotation matrix, row by row
 ROLL_AXIS = 31  # 3: unit vector in body, a constant of the session like the reference pose
 SHARING = 34  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-EFFECTS_SIZE = 35
+CREEP = 35  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
+EFFECTS_SIZE = 36
 
 
 def effects_block(cables: int) -> int:
