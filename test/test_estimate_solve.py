@@ -10,9 +10,11 @@ from scipy.optimize import lsq_linear
 from test_estimate_prediction import recorded, vector_of
 from test_model_rigs import random_sample
 
+from rig_identification.estimate import solve as fitting
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import (
+    Evaluation,
     Point,
     Problem,
     _along_valley,
@@ -66,6 +68,28 @@ def test_residuals_without_derivatives_are_the_same(fit: tuple[Problem, Point]) 
     assert quick is not None
     np.testing.assert_allclose(quick.runs[0].residual, whole.runs[0].residual, rtol=0.0, atol=1e-9)
     assert quick.cost == pytest.approx(whole.cost, rel=1e-12)
+
+
+def test_no_fit_ends_on_residuals_without_derivatives(
+    fit: tuple[Problem, Point], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, point = fit
+    first = evaluate(problem, point)
+    assert first is not None
+    tried = []
+
+    def plateau(problem: Problem, at: Point, *, residuals_only: bool = False) -> Evaluation | None:
+        """The first step fails; all others win what is rounding."""
+        found = evaluate(problem, at, residuals_only=residuals_only)
+        tried.append(residuals_only)
+        worse = 1.0 if len(tried) == 2 else 1e-10 * abs(first.cost)
+        return None if found is None else replace(found, cost=first.cost + worse)
+
+    monkeypatch.setattr(fitting, "evaluate", plateau)
+    found, _ = fitting.solve(problem, point, iterations=1)
+    assert any(tried)
+    p = problem.bench.parameters.size
+    assert np.any(found.runs[0].jacobian[:, :p])
 
 
 def test_a_bent_step_follows_the_valley(fit: tuple[Problem, Point]) -> None:
