@@ -117,11 +117,7 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
         return None
     fitted = ideal.fitted
     problem = with_reference(fitted.problem, fitted.rest)
-    if ideal.pieces is None or ideal.careful is None:
-        here, point = problem, fitted.evaluation.point
-    else:
-        here, point = with_reference(ideal.pieces, fitted.rest), ideal.careful[1].point
-    evaluation = evaluate(here, point)
+    here, evaluation = _short_pieces(ideal) or (problem, evaluate(problem, fitted.evaluation.point))
     if evaluation is None:
         return None
     search = _Search(problem, here, evaluation, excess(evaluation))
@@ -143,12 +139,17 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
     return _unexplained(ideal, search, best, notify)
 
 
-def _gentle_push(ideal: Ideal, problem: Problem, notify: Notify) -> Explained | None:
-    """A push so gentle that whole runs come near the noise with it."""
+def _short_pieces(ideal: Ideal) -> tuple[Problem, Evaluation | None] | None:
+    """The short pieces that the cautious fit was made to, and where it ended; None where there was none."""
     if ideal.pieces is None or ideal.careful is None:
         return None
     here = with_reference(ideal.pieces, ideal.fitted.rest)
-    evaluation = evaluate(here, ideal.careful[1].point)
+    return here, evaluate(here, ideal.careful[1].point)
+
+
+def _gentle_push(ideal: Ideal, problem: Problem, notify: Notify) -> Explained | None:
+    """A push so gentle that whole runs come near the noise with it."""
+    here, evaluation = _short_pieces(ideal) or (problem, None)
     return None if evaluation is None else without_push(ideal, problem, here, evaluation, notify)
 
 
@@ -336,10 +337,10 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
         if partly:
             named = ", ".join(str(p["effect"]) for p in partly)
             explanation += f" {named} would take away a part of it, which does not convince."
-        if search.found and ideal.pieces is not None and ideal.careful is not None:
+        pieces = _short_pieces(ideal) if search.found else None
+        if pieces is not None:
             # What is not told must not take part of the missing wrench away
-            pieces = with_reference(ideal.pieces, ideal.fitted.rest)
-            here, evaluation = pieces, evaluate(pieces, ideal.careful[1].point) or evaluation
+            here, evaluation = pieces[0], pieces[1] or evaluation
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))

@@ -46,8 +46,7 @@ def without_push(
         return None
     push, start, end = told
     for first, last in ((start, end), (event.start, event.end)):
-        parts = tuple(part for run in problem.runs for part in _without(run, event, first, last))
-        whole = replace(problem, runs=parts)
+        whole = replace(problem, runs=_all_without(problem.runs, event, first, last))
         fitted = fit_whole(ideal.fitted, whole, here, event.point)
         after, verdict = judged(fitted)
         if verdict.verdict == "none":
@@ -85,7 +84,7 @@ def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event 
 def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
     """The ideal model fitted to all but the pieces that an event disturbs."""
     fitted = ideal.fitted
-    runs = tuple(p for run in fitted.problem.runs for p in _without(run, event, event.start, event.end))
+    runs = _all_without(fitted.problem.runs, event, event.start, event.end)
     return fit_again(ideal, runs, fitted.holdout_runs, notify)
 
 
@@ -101,6 +100,11 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
     push = replace(told[0], evidence=evidence_of(ideal, fitted, after))
     mismatch = replace(found.mismatch, findings=(*found.mismatch.findings, push))
     return replace(found, mismatch=mismatch)
+
+
+def _all_without(runs: tuple[Run, ...], event: Event, start: float, end: float) -> tuple[Run, ...]:
+    """The stretches of all runs before and after a push."""
+    return tuple(part for run in runs for part in _without(run, event, start, end))
 
 
 def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
