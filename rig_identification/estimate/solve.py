@@ -350,9 +350,17 @@ def _as_good_as_settled(problem: Problem, current: Evaluation) -> bool:
     The residuals' spreads depend on the parameters as well, and that slope is not in the Jacobian: at
     the best point it and the residuals' own balance, and a full step promises a little for ever.
     """
-    change = _bounded_step(problem, current, 0.0)
-    gain = float(change @ current.gradient - 0.5 * change @ current.information @ change)
-    return gain < CLOSE and not on_plateau(current)
+    return still_promised(problem, current) < CLOSE and not on_plateau(current)
+
+
+def still_promised(problem: Problem, current: Evaluation) -> float:
+    """Gain (nats) that a full step would bring to second order."""
+    return _promised(current, _bounded_step(problem, current, 0.0))
+
+
+def _promised(current: Evaluation, change: Array) -> float:
+    """Gain (nats) of a step to second order."""
+    return float(change @ current.gradient - 0.5 * change @ current.information @ change)
 
 
 def excess(evaluation: Evaluation) -> float:
@@ -406,7 +414,7 @@ def solve(
             # About as little damping failed last
             wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
-            gain = float(change @ current.gradient - 0.5 * change @ current.information @ change)
+            gain = _promised(current, change)
             if gain < tolerance and damping <= 1e-3:
                 return current, not on_plateau(current)
             if damping > 1e-3 and gain < polish * excess(current):

@@ -21,6 +21,7 @@ from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
@@ -66,6 +67,7 @@ class _Search:
     rivals: list[dict[str, object]] = field(default_factory=list)
     liar: str | None = None
     screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
+    budget: Budget = field(default_factory=Budget)
 
     @property
     def whole(self) -> bool:
@@ -87,9 +89,9 @@ def explain(ideal: Ideal, spells: list[Spell], notify: Notify) -> Explained | No
     taut = taut_ideal(ideal, spells, notify)
     if taut is None:
         return _explain(ideal, notify)
-    found = None
-    if near_noise(taut.fitted):
-        found = _explain(taut, notify)
+    if not near_noise(taut.fitted):
+        taut = with_pieces(taut, notify)
+    found = _explain(taut, notify)
     return with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
 
 
@@ -170,6 +172,8 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
     best: Explained | None = None
     fallback: Explained | None = None
     for step in range(MOST_EFFECTS):
+        if step and search.budget.spent:
+            break
         left = [c for c in candidates if c.label not in {t.candidate.label for t in search.found}]
         at = (step + 0.5) / (MOST_EFFECTS + 1)
         tried = trials(
@@ -179,6 +183,7 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
             ORDINARY,
             lambda label, at=at: notify(f"search: {label}", at),  # type: ignore[misc]
             search.screened,
+            search.budget,
         )
         search.screened = None
         search.liar = search.liar or tried.liar
@@ -190,6 +195,10 @@ def _named(ideal: Ideal, search: _Search, notify: Notify) -> Explained | None:
         if not search.whole:
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         if misfit(search.evaluation) > EXPLAINED:
+            # A push among pieces that all lack something stands out with that in the model
+            beside = None if search.whole else _beside_push(ideal, search.here, search.evaluation, notify)
+            if beside is not None:
+                return beside
             if search.share < CHIEF:
                 # Two effects take nearly all away only where the first takes the larger part
                 break
@@ -341,6 +350,8 @@ def _unexplained(ideal: Ideal, search: _Search, best: Explained | None, notify: 
         if pieces is not None:
             # What is not told must not take part of the missing wrench away
             here, evaluation = pieces[0], pieces[1] or evaluation
+    if search.budget.spent:
+        explanation += f" The search ended after {search.budget.seconds:.0f} s, short of some hypotheses."
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))

@@ -98,7 +98,11 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
         return None
     after = judged(fitted)[0].holdout
     push = replace(told[0], evidence=evidence_of(ideal, fitted, after))
-    mismatch = replace(found.mismatch, findings=(*found.mismatch.findings, push))
+    mismatch = replace(
+        found.mismatch,
+        explanation=f"Outside the push: {found.mismatch.explanation}",
+        findings=(*found.mismatch.findings, push),
+    )
     return replace(found, mismatch=mismatch)
 
 

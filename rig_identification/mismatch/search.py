@@ -16,9 +16,10 @@ from scipy.stats import chi2
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH, far_promises, supports
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import told_apart
@@ -114,14 +115,17 @@ def _at_noise(trial: Trial) -> bool:
 def _without_support(tried: list[Trial], before: Evaluation) -> bool:
     """Whether near the noise there is no need to try what gives way.
 
-    There is none where a hypothesis takes away the larger part of what is left. Where the residuals as a
-    whole show nothing that is, there is only if something that swings, which is alike, is the best.
+    There is none where a hypothesis takes away the larger part of what is left; if it swings, which is
+    alike, all of it. Where the residuals as a whole show nothing that is, there is only if something that
+    swings is the best.
     """
     first = max(tried, key=lambda t: t.evidence, default=None)
     left, size = excess(before), sum(run.residual.size for run in before.runs)
     if left < SEEN * np.sqrt(0.5 * size):
         return first is None or first.candidate.build is None
-    return first is not None and before.cost - first.evaluation.cost > CHIEF * left
+    if first is None or (first.candidate.build is not None and not _at_noise(first)):
+        return False
+    return before.cost - first.evaluation.cost > CHIEF * left
 
 
 def _almost(trial: Trial, before: Evaluation) -> bool:
@@ -145,14 +149,17 @@ def trials(
     limit: float,
     notify: Notify,
     screened: list[Promise] | None = None,
+    budget: Budget | None = None,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
     All get a few steps; the best few go on to their end, and where one reaches the noise only those
     that had come as close. Where much is left and no hypothesis takes it away that promised to, first order
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
-    tried whatever screening says. screened: promises about this evaluation, where they are known.
+    tried whatever screening says. screened: promises about this evaluation, where they are known. Where the
+    budget is spent nothing more that changes the model is begun.
     """
+    budget = budget or Budget()
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
     if far:
@@ -162,7 +169,7 @@ def trials(
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
     tried: list[Trial] = []
     if not far or (promises and promises[0].share > DIRECT):
-        tried = begun(here, seen, worth_a_fit(promises, count), far, notify)
+        tried = begun(here, seen, worth_a_fit(promises, count), far, notify, budget)
     device, needed = None, log_evidence(seen) + MEANT
     if far and not any(_at_noise(t) for t in tried):
         liar = None
@@ -175,20 +182,22 @@ def trials(
             device = liar.device
             about = evaluate(problem, liar.point) or seen
             worthy = worth_a_fit(screen(problem, about, candidates, mass), count, device)
-            tried += begun(here, about, worthy, False, notify)
+            tried += begun(here, about, worthy, False, notify, budget)
         if not any(_at_noise(t) for t in tried):
             known = {t.candidate.label for t in tried}
             notify("what gives way")
             worthy = [p for p in far_promises(here, seen, promises, mass) if p.candidate.label not in known]
             known |= {p.candidate.label for p in worthy}
             worthy += [p for p in worth_a_fit(promises, count) if p.candidate.label not in known]
-            tried += begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify)
+            tried += begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify, budget)
     if not far and not _without_support(tried, seen):
         # Of what rings first order says nothing
         notify("what gives way")
         known = {t.candidate.label for t in tried}
         worthy = [p for p in supports(here, seen, mass) if p.candidate.label not in known]
-        tried += begun(here, seen, worth_a_fit(sorted(worthy, key=lambda p: -p.gain), count), False, notify)
+        tried += begun(
+            here, seen, worth_a_fit(sorted(worthy, key=lambda p: -p.gain), count), False, notify, budget
+        )
     if not tried:
         return Trials([], device)
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
@@ -232,11 +241,20 @@ def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
     """Whether a hypothesis is no rival of those that reached the noise, by its first steps."""
     if far:
         return excess(trial.evaluation) > RIVAL * excess(first.evaluation)
-    return trial.evidence < max(t.evidence for t in done) - BEATEN
+    best = max(t.evidence for t in done) - BEATEN
+    if trial.settled or trial.evidence > best:
+        return trial.evidence < best
+    # A curved valley takes more steps than the first ones
+    return trial.evidence + still_promised(trial.problem, trial.evaluation) < best
 
 
 def begun(
-    problem: Problem, evaluation: Evaluation, worthy: list[Promise], far: bool, notify: Notify
+    problem: Problem,
+    evaluation: Evaluation,
+    worthy: list[Promise],
+    far: bool,
+    notify: Notify,
+    budget: Budget,
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
@@ -248,6 +266,8 @@ def begun(
     for promise in worthy:
         if promise.candidate.build is not None and promise.share < CHIEF and slow:
             # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
+            continue
+        if promise.candidate.build is not None and budget.spent:
             continue
         if not far and promise.gain < min(CLOSE * kept, kept - BEATEN):
             # Another hypothesis promised much more, near the noise, and kept it

@@ -54,7 +54,10 @@ class Spell:
 
 
 def slack_spells(run: Run, zero: float) -> list[Spell]:
-    """Spells in which a cable of ``run`` carries nothing. zero: tolerance of a cell's zero, N."""
+    """Spells in which a cable of ``run`` carries nothing. zero: tolerance of a cell's zero, N.
+
+    What pulls less than nothing for longer than it pulls nothing is a rod that pushes: it is never slack.
+    """
     out: list[Spell] = []
     for c in run.channels:
         if c.quantity != "tension":
@@ -64,7 +67,8 @@ def slack_spells(run: Run, zero: float) -> list[Spell]:
         if limit > USUAL * float(np.median(tension)):
             continue
         loose = np.flatnonzero(tension < limit)
-        if loose.size < FEW:
+        pushed = np.count_nonzero(tension < -limit)
+        if loose.size < FEW or 2 * pushed > loose.size:
             continue
         out += _spells_at(run, c.device, c.time[loose])
     return out
@@ -173,4 +177,7 @@ def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained
         fitted = found.ideal.fitted
         mismatch = Mismatch("explained", text, (), mismatch.alternatives)
         found = replace(found, fitted=fitted, loose=max(found.loose, hear(fitted).looseness))
-    return replace(found, mismatch=replace(mismatch, findings=(slack, *mismatch.findings)))
+    # What is left out of the fit bends nothing: what is in its model says more
+    named = mismatch.verdict == "explained"
+    findings = (*mismatch.findings, slack) if named else (slack, *mismatch.findings)
+    return replace(found, mismatch=replace(mismatch, findings=findings))

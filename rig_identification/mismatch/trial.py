@@ -7,12 +7,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.growing import (
+    NEAR_SQUARE,
+    fit_start_growing,
+    held_over,
+    misfit,
+    settled_starts,
+)
+from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, solve
+from rig_identification.estimate.prediction import Linearised, model_at
+from rig_identification.estimate.solve import HOPELESS, POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.model.equilibrium import find_rest
+from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
@@ -69,30 +80,66 @@ def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Pro
         (run.recording.name, run.offset): start
         for run, start in zip(trial.problem.runs, trial.evaluation.point.starts, strict=True)
     }
+    point = replace(point, theta=theta)
     starts = tuple(
-        known.get((run.recording.name, run.offset), start)
+        known.get((run.recording.name, run.offset)) or _begun(wide, run, point, start)
         for run, start in zip(wide.runs, point.starts, strict=True)
     )
-    fitted, _ = solve(wide, replace(point, theta=theta, starts=starts), iterations=6, tolerance=0.5)
+    fitted, _ = solve(wide, replace(point, starts=starts), iterations=6, tolerance=0.5)
     return wide, fitted
+
+
+def _begun(problem: Problem, run: Run, point: Point, start: State) -> State:
+    """Where a piece starts that a trial has not seen: with what it adopts that may be far from before."""
+    found = fit_start_growing(problem.bench, run, point.theta, start)
+    if found is not None and float(np.mean(found[0].residual ** 2)) < HOPELESS:
+        return found[1]
+    guess = (*point.rest_guesses, start)[0]
+    rest = find_rest(model_at(problem.bench.parameters, point.theta), guess).state
+    launched = launch_state(problem.bench, run, point.theta, rest)
+    again = fit_start_growing(problem.bench, run, point.theta, launched)
+    found = min((f for f in (found, again) if f is not None), key=_left, default=None)
+    return start if found is None else found[1]
+
+
+def _left(found: tuple[Linearised, State]) -> float:
+    """Squared residuals that a start state leaves."""
+    return float(found[0].residual @ found[0].residual)
 
 
 def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial | None:
     """A first, short fit of one hypothesis from what screening promised; None where it cannot start."""
     candidate = promise.candidate
-    # Blows have no second derivative to follow
-    bends = candidate.build is not None and candidate.effect != "loose_mass"
     wide = extended(problem, (candidate,))
     begun = carried(wide, problem, evaluation.point)
     point = promised(wide, begun, candidate, promise.values, evaluation)
     try:
         if candidate.build is not None:
             point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE)
+        else:
+            point = _nearer(wide, point, begun)
         steps = FIRST_STEPS if candidate.build is None else CHANGED_STEPS
-        fitted, settled = solve(wide, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=bends)
+        fitted, settled = solve(
+            wide, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=_bends(candidate)
+        )
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+
+
+def _bends(candidate: Candidate) -> bool:
+    """Whether steps are bent along their valley: blows have no second derivative to follow."""
+    return candidate.effect != "loose_mass"
+
+
+def _nearer(problem: Problem, promised: Point, begun: Point) -> Point:
+    """Where a fit starts that does not change the model: at what screening promised, unless that fits worse.
+
+    A promise holds where all that is fitted moves with it, to first order. Far off, over a run of half a
+    minute, that may be thrown out by more than the whole effect, and the way there is walked step by step.
+    """
+    there, here = (evaluate(problem, p, residuals_only=True) for p in (promised, begun))
+    return begun if there is None or (here is not None and here.cost < there.cost) else promised
 
 
 def promised(
@@ -159,7 +206,7 @@ def finished(trial: Trial) -> Trial | None:
             iterations=LAST_STEPS,
             tolerance=0.05,
             polish=POLISH,
-            bends=trial.candidate.build is not None,
+            bends=_bends(trial.candidate),
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
     if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial)):
