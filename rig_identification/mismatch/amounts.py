@@ -151,6 +151,24 @@ def _spread(ends: tuple[float, float], spaced: float) -> Array:
     return np.asarray(np.geomspace(*ends, count))
 
 
+def _ringing_ceiling(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:
+    """A ceiling that rings as fast as the part on springs that promises most, and along the same axis.
+
+    A ceiling that is light rings together with the body, slower than by itself; scanned at its usual
+    frequency it is out of step at any amount. With next to no compliance it rings at its own frequency:
+    from there a fit follows both.
+    """
+    springs = next((p for p in promises if p.candidate.effect == "sprung_mass"), None)
+    if springs is None:
+        return []
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    axis = AXES.index(str(springs.candidate.where["axis"]))
+    frequency = next(p.nominal for p in springs.candidate.parameters if p.name == "sprung_mass.frequency")
+    ceiling = ceiling_candidate(rig, model, mass, axis, frequency=frequency)
+    compliance = SINKS[0] * largest_compliance(rig, mass)
+    return [Promise(ceiling, springs.gain, {f"ceiling.compliance.{AXES[axis]}": compliance})]
+
+
 def far_promises(
     problem: Problem, evaluation: Evaluation, promises: list[Promise], mass: float
 ) -> list[Promise]:
@@ -161,6 +179,7 @@ def far_promises(
     out += brakes(problem, evaluation, promises)
     riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
     out += riders[:1]
+    out += _ringing_ceiling(problem, promises, mass)
     out += [p for p in promises if p.candidate.effect == "loose_mass"][:1]
     if riders and riders[0].candidate.effect == "sprung_mass":
         # What swings along one axis may swing to all sides

@@ -47,16 +47,27 @@ def _compliance_prior(rig: Rig, mass: float) -> float:
     return 0.005 / (mass * rig.gravity)
 
 
-def _block(axis: int, damping: float) -> Array:
+def _block(axis: int, damping: float, frequency: float) -> Array:
     block = np.zeros((1, layout.INTERNAL_SIZE))
     block[0, layout.KIND] = layout.CEILING
     block[0, layout.AXIS + axis] = 1.0
-    block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = CEILING_FREQUENCY, damping
+    block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = frequency, damping
     return block
 
 
-def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, probe: bool = False) -> Candidate:
-    """A ceiling that yields along one axis of the world; as a probe its compliance alone is free."""
+def ceiling_candidate(
+    rig: Rig,
+    model: RigModel,
+    mass: float,
+    axis: int,
+    *,
+    probe: bool = False,
+    frequency: float = CEILING_FREQUENCY,
+) -> Candidate:
+    """A ceiling that yields along one axis of the world; as a probe its compliance alone is free.
+
+    frequency: Hz, of the ceiling by itself, where a fit starts.
+    """
     a = AXES[axis]
 
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
@@ -70,7 +81,7 @@ def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, prob
             o + layout.COMPLIANCE,
             bounded=False,
         )
-        names = (("frequency", "Hz", CEILING_FREQUENCY, 0.5), ("damping_ratio", "1", DAMPING, 1.0))
+        names = (("frequency", "Hz", frequency, 0.5), ("damping_ratio", "1", DAMPING, 1.0))
         more = [
             Parameter(
                 f"ceiling.{name}.{a}", unit, start, std, "physics", o + entry, bounded=False, ratio=True
@@ -79,9 +90,8 @@ def ceiling_candidate(rig: Rig, model: RigModel, mass: float, axis: int, *, prob
                 names, (layout.FREQUENCY, layout.DAMPING_RATIO), strict=True
             )
         ]
-        return model.with_internal(_block(axis, PROBE_DAMPING if probe else DAMPING)), (
-            compliance,
-        ) if probe else (compliance, *more)
+        block = _block(axis, PROBE_DAMPING if probe else DAMPING, frequency)
+        return model.with_internal(block), (compliance,) if probe else (compliance, *more)
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
         compliance = values[f"ceiling.compliance.{a}"]
