@@ -25,6 +25,20 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Overrange:
+    """One component of what a device measures, at an end of the device's range."""
+
+    device: str  # a cable's name, "imu", "inclinometer" or "exciter"
+    quantity: str  # "tension", "angular_rate", "specific_force", "inclination" or "force"
+    axis: str | None  # "x", "y", "z" or None
+    unit: str
+    limit: float  # in that unit
+    samples: int
+    start: float  # s after the recording's start, first such sample
+    end: float  # s, last one
+
+
+@dataclass(frozen=True)
 class ChannelQuality:
     """What was found in one topic before it was used."""
 
@@ -42,6 +56,7 @@ class ChannelQuality:
     not_finite: int  # samples with NaN or infinity where a number is due
     clipped: int  # samples stuck at the extreme value of the channel
     notes: tuple[str, ...] = ()  # sentences for the report
+    overranges: tuple[Overrange, ...] = ()  # where and at what value samples are clipped
 
 
 @dataclass(frozen=True)

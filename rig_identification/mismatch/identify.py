@@ -23,6 +23,7 @@ from rig_identification.estimate.identify import (
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.explain import explain
+from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.watched import explain_watched
 from rig_identification.recording import Session
@@ -61,6 +62,7 @@ def identify(
     if less is not None:
         rest, _ = _identified(less.session, notify, assumed)
         found = _without_unseen(found, rest, less.note)
+    found = replace(found, mismatch=with_overranges(found.mismatch, session))
     return found if origins.given else told(found, origins)
 
 

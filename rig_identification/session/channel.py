@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
-from rig_identification.recording import ChannelQuality, Series
+from rig_identification.recording import ChannelQuality, Overrange, Series
 from rig_identification.session.cdr import decode
-from rig_identification.session.clipping import clipped_samples
+from rig_identification.session.clipping import Limit, limits
 from rig_identification.session.raw_topic import RawTopic
 from rig_identification.session.stamps import StampSelection, select_stamps
 from rig_identification.session.topics import Topic
@@ -26,8 +26,16 @@ _COLUMNS = {
     "mocap": list(range(7)),
     "ground_truth": list(range(13)),
 }
-#: Channels whose sensor has an end of range.
-_CAN_CLIP = ("tension", "exciter_force", "imu", "inclination")
+#: Channels whose sensor has an end of range: device, quantity, axis and unit of each column.
+_CAN_CLIP: dict[str, tuple[tuple[str | None, str, str | None, str], ...]] = {
+    "tension": ((None, "tension", None, "N"),),
+    "exciter_force": tuple(("exciter", "force", a, "N") for a in "xyz"),
+    "imu": (
+        *(("imu", "angular_rate", a, "rad/s") for a in "xyz"),
+        *(("imu", "specific_force", a, "m/s^2") for a in "xyz"),
+    ),
+    "inclination": tuple(("inclinometer", "inclination", a, "rad") for a in "xy"),
+}
 #: Channels that carry a quaternion in columns 3 to 6.
 _POSES = ("mocap", "ground_truth")
 _GAP = 1.5  # median intervals
@@ -52,6 +60,7 @@ class Channel:
     not_finite: int
     clipped: int
     notes: tuple[str, ...]
+    stuck: tuple[tuple[Limit, NDArray[np.int64]], ...] = ()  # ends of range, and the stamps (k,) there
 
     def series(self, start_ns: int) -> Series | None:
         """Samples against seconds after ``start_ns``; None where nothing was measured."""
@@ -80,7 +89,14 @@ class Channel:
             not_finite=self.not_finite,
             clipped=self.clipped,
             notes=self.selection.notes + self.notes + extra_notes,
+            overranges=tuple(self._overrange(limit, stamps, start_ns) for limit, stamps in self.stuck),
         )
+
+    def _overrange(self, limit: Limit, stamps: NDArray[np.int64], start_ns: int) -> Overrange:
+        device, quantity, axis, unit = _CAN_CLIP[self.topic.channel][limit.column]
+        first, last = (float((stamps[k] - start_ns) / _SECOND) for k in (0, -1))
+        name = device or str(self.topic.cable)
+        return Overrange(name, quantity, axis, unit, limit.value, len(stamps), first, last)
 
 
 def read_channel(raw: RawTopic, topic: Topic, where: str) -> Channel:
@@ -130,12 +146,14 @@ def _clean(
     elif topic.channel in _CAN_CLIP and len(values) >= _STUCK and not np.ptp(values[finite], axis=0).any():
         notes = ("the values never change: the device may be stuck or switched off",)
     clipped = np.zeros(len(values), bool)
-    if topic.channel in _CAN_CLIP:
-        clipped[finite] = clipped_samples(values[finite])
+    ends = limits(values[finite]) if topic.channel in _CAN_CLIP else []
+    for end in ends:
+        clipped[finite] |= end.stuck
+    stuck = tuple((end, stamp_ns[finite][end.stuck]) for end in ends)
     used = finite & ~clipped
     return Channel(
         topic, stamp_ns[used], np.ascontiguousarray(values[used]), count, selection, stamp_ns,
-        int(np.count_nonzero(~finite)), int(np.count_nonzero(clipped)), notes,
+        int(np.count_nonzero(~finite)), int(np.count_nonzero(clipped)), notes, stuck,
     )  # fmt: skip
 
 
