@@ -49,6 +49,16 @@ def test_a_spell_is_found_and_cut_out(run: Run) -> None:
     assert finding.where["channel"] == spell.cable
 
 
+def test_a_rod_that_pushes_is_not_slack(run: Run) -> None:
+    """It passes through nothing on its way, and stays below it for longer."""
+    c = run.channels[0]
+    swing = 300.0 + 400.0 * np.sin(2.0 * np.pi * 0.7 * c.time)[:, None]
+    assert slack_spells(replace(run, channels=(replace(c, values=swing), *run.channels[1:])), 3.0) == []
+    # A rope on the same body stops at nothing
+    rope = np.maximum(swing, 0.0)
+    assert slack_spells(replace(run, channels=(replace(c, values=rope), *run.channels[1:])), 3.0)
+
+
 def test_a_glitch_is_no_spell(run: Run) -> None:
     step = float(np.median(np.diff(run.channels[0].time)))
     assert slack_spells(_with_nothing(run, 3.0, 3.0 + 1.5 * step), 3.0) == []

@@ -14,8 +14,11 @@ from rig_identification.estimate.identify import fit_session, judged, pose_probl
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import weighed_otherwise
-from rig_identification.mismatch.amounts import SPACED, Amount
-from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.amounts import SPACED, Amount, _ringing_ceiling
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.riders import Swing, rider_candidate
+from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.search import begun, catalogue
 from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
 from rig_identification.mismatch.trial import attempt, mass_of
 from rig_identification.recording import Series, Session
@@ -58,6 +61,47 @@ def test_the_amount_of_stretch_is_found_from_far_off(
         zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
     )
     assert found["cable.axial_stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
+
+
+def test_a_spent_budget_begins_nothing_that_changes_the_model(
+    inextensible: tuple[Problem, Evaluation],
+) -> None:
+    problem, evaluation = inextensible
+    mass = mass_of(problem, evaluation)
+    stretch = cable_elasticity(problem.bench.rig, problem.bench.parameters.model, mass)
+    gain = next(c for c in catalogue(problem) if c.effect == "load_cell_gain")
+    promises = [
+        Promise(stretch, 1e6, {"cable.axial_stiffness": STIFFNESS}, 1.0),
+        Promise(gain, 1e5, {}, 0.1),
+    ]
+    tried = begun(problem, evaluation, promises, True, lambda stage: None, Budget(seconds=-1.0))
+    assert [t.candidate.effect for t in tried] == ["load_cell_gain"]
+
+
+def test_a_promise_too_far_off_is_walked_to(inextensible: tuple[Problem, Evaluation]) -> None:
+    """A hinge a metre away throws out more than it explains: the fit starts from where it was."""
+    problem, evaluation = inextensible
+    hinge = next(c for c in catalogue(problem) if c.effect == "hinge_position")
+    name = hinge.parameters[0].name
+    place = hinge.parameters[0].nominal
+    trial = attempt(problem, evaluation, Promise(hinge, 1e5, {name: place + 1.0}, 0.5))
+    assert trial is not None
+    assert trial.evaluation.cost < evaluation.cost
+
+
+def test_a_ceiling_is_begun_as_fast_as_what_promises_most(
+    inextensible: tuple[Problem, Evaluation],
+) -> None:
+    problem, evaluation = inextensible
+    mass = mass_of(problem, evaluation)
+    swing = Swing("y", 6.5)
+    springs, values = rider_candidate(problem, swing, mass, 10.0, np.zeros(3))
+    (promise,) = _ringing_ceiling(problem, [Promise(springs, 100.0, values, 0.5)], mass)
+    assert promise.candidate.where == {"channel": "ceiling", "axis": "y"}
+    nominal = {p.name: p.nominal for p in promise.candidate.parameters}
+    assert nominal["ceiling.frequency.y"] == 6.5
+    assert promise.values["ceiling.compliance.y"] > 0.0
+    assert _ringing_ceiling(problem, [], mass) == []
 
 
 def test_the_usual_stiffness_is_within_what_wire_and_rope_have() -> None:

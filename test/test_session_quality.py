@@ -174,6 +174,9 @@ def test_clipped_values(tmp_path: Path) -> None:
     assert len(clipped) > 100
     assert_subset(read.tension["cable_1"], sound, clipped)
     assert account(read, CABLE).clipped == len(clipped)
+    (end,) = account(read, CABLE).overranges
+    assert (end.device, end.quantity, end.axis, end.unit) == ("cable_1", "tension", None, "N")
+    assert (end.limit, end.samples) == (limit, len(clipped))
     assert account(read, "/rig/cable_2/wrench").clipped == 0
 
 
