@@ -20,6 +20,7 @@ from rig_identification.estimate.observability import inertial_estimate, invert_
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.rest_evidence import prepare_rest
+from rig_identification.estimate.rods import note_of, rods_of, with_rods
 from rig_identification.estimate.scan import scan
 from rig_identification.estimate.segments import (
     FreePart,
@@ -65,6 +66,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     runs = tuple(away_from_jumps(part) for r in session.training for part in prepare(rig, r).where_driven())
     held = tuple(away_from_jumps(part) for r in session.holdouts for part in prepare(rig, r).where_driven())
     rests = tuple(prepare_rest(rig, recording) for recording in session.statics)
+    model = with_rods(model, rig, rods_of(rig, (*runs, *held)))
     channels = {c.device for run in (*runs, *held) for c in run.channels}
     channels |= {c.device for evidence in rests for c in evidence.channels}
     if not channels:
@@ -185,6 +187,8 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
     fitted = fit_from(start_of(problem, theta, held, progress), progress)
+    rods = rods_of(session.rig, (*problem.runs, *held))
+    fitted = replace(fitted, notes=(*fitted.notes, note_of(rods))) if rods else fitted
     less = without_unseen_force(session, fitted, _surely_driven)
     if less is None:
         return fitted

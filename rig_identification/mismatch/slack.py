@@ -16,19 +16,15 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fit_again, judged
+from rig_identification.estimate.rods import FEW, pushes, reads_nothing
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
 
-#: A cell reads nothing where it reads less than so many std of its noise and tolerance of its zero.
-NOTHING = 4.0
 #: Share of a cable's usual tension below which such a reading means something.
 USUAL = 0.1
-#: So many samples of a run must read nothing: one or two are glitches. A cable that snaps rings, and may be
-#: loose for no more than a sample at a time.
-FEW = 5
 #: Spells (s) closer to each other than this are one.
 JOINED = 0.2
 #: Share of the slackest cable's time below which another one rings rather than hangs loose.
@@ -56,19 +52,18 @@ class Spell:
 def slack_spells(run: Run, zero: float) -> list[Spell]:
     """Spells in which a cable of ``run`` carries nothing. zero: tolerance of a cell's zero, N.
 
-    What pulls less than nothing for longer than it pulls nothing is a rod that pushes: it is never slack.
+    What pushes is a rod, and never slack.
     """
     out: list[Spell] = []
     for c in run.channels:
         if c.quantity != "tension":
             continue
         tension = c.values[:, 0]
-        limit = NOTHING * float(np.hypot(c.noise[0], zero))
-        if limit > USUAL * float(np.median(tension)):
+        limit = reads_nothing(c, zero)
+        if limit > USUAL * float(np.median(tension)) or pushes(c, zero):
             continue
         loose = np.flatnonzero(tension < limit)
-        pushed = np.count_nonzero(tension < -limit)
-        if loose.size < FEW or 2 * pushed > loose.size:
+        if loose.size < FEW:
             continue
         out += _spells_at(run, c.device, c.time[loose])
     return out

@@ -143,7 +143,7 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:
 
         elastic = replace(
             model,
-            modes=np.full(n, layout.ELASTIC, dtype=np.int64),
+            modes=np.where(model.can_slacken, layout.ELASTIC, layout.ELASTIC_ROD).astype(np.int64),
             can_slacken=np.zeros(n, dtype=np.bool_),
         )
         return elastic, (
