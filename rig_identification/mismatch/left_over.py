@@ -1,0 +1,72 @@
+"""What is told where something is left: names that convince, and a stand-in for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.growing import misfit, settled_starts
+from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
+from rig_identification.estimate.segments import in_pieces
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.verdict import hear
+from rig_identification.mismatch.explained import Explained, evidence_of
+from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
+from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.unknown import unknown_finding
+from rig_identification.mismatch.whole_runs import whole_runs
+from rig_identification.result import Finding, Mismatch
+
+Notify = Callable[[str, float], None]
+
+#: Share of the excess that named effects must take away to be told where something is left.
+CONVINCING = 0.95
+
+
+def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: Notify) -> Explained:
+    """What is told where something is left: named effects only where they take nearly all of it away."""
+    convincing = bool(search.found) and search.share > CONVINCING and misfit(search.evaluation) < EXPLAINED**2
+    ideal = with_pieces(ideal, notify)
+    if convincing and best is None:
+        best = whole_runs(ideal, search)
+    notify("search: the missing wrench", 0.95)
+    here, evaluation = search.here, search.evaluation
+    convincing = convincing and best is not None and misfit(best.fitted.evaluation) < WRONG
+    if convincing and best is not None and not hear(best.fitted).contradicted:
+        kept: tuple[Finding, ...] = best.mismatch.findings
+        fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
+    else:
+        kept, fitted, explanation = (), ideal.fitted, ideal.mismatch.explanation
+        partly: list[dict[str, object]] = [
+            {"effect": t.candidate.effect, "where": dict(t.candidate.where), "log_likelihood_gap": 0.0}
+            for t in search.found
+        ]
+        rivals = (*partly, *search.rivals)
+        if partly:
+            named = ", ".join(str(p["effect"]) for p in partly)
+            explanation += f" {named} would take away a part of it, which does not convince."
+        pieces = short_pieces(ideal) if search.found else None
+        if pieces is not None:
+            # What is not told must not take part of the missing wrench away
+            here, evaluation = pieces[0], pieces[1] or evaluation
+    if search.budget.spent:
+        explanation += f" The search ended after {search.budget.seconds:.0f} s, short of some hypotheses."
+    unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
+    evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
+    findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
+    # Far from the noise the cautious fit knows by itself how little it knows
+    loose = hear(ideal.fitted).looseness if near_noise(ideal.fitted) else 1.0
+    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, loose)
+
+
+def _unknown(ideal: Fitted, here: Problem, evaluation: Evaluation, liar: str | None) -> Finding | None:
+    """A stand-in for what ``evaluation`` leaves, seen in short pieces."""
+    if len(here.runs) == len(ideal.problem.runs):
+        point = evaluation.point
+        here, start = in_pieces(here, point.theta, ideal.rest, point.rest_guesses)
+        again = evaluate(here, replace(start, starts=settled_starts(here, start)))
+        if again is None:
+            return None
+        evaluation = again
+    return unknown_finding(here, evaluation, ideal.rest, mass_of(here, evaluation), liar)

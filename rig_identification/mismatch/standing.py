@@ -1,0 +1,53 @@
+"""Where a search stands: what is in the model so far, and what hypotheses are tried on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.search import Trials
+from rig_identification.mismatch.trial import Trial, adopted
+
+#: Mean square of whitened residuals up to which short pieces count as explained.
+EXPLAINED = 1.3
+#: Mean square of whole runs' residuals that refutes what short pieces agreed to.
+WRONG = 3.0
+
+
+@dataclass
+class Search:
+    """Where a search stands."""
+
+    problem: Problem  # whole runs, ideal model
+    here: Problem  # what hypotheses are tried on: short pieces where much is left, whole runs near the noise
+    evaluation: Evaluation
+    start: float  # excess in short pieces before anything was found
+    share: float = 0.0  # of that excess that the effects found take away
+    found: list[Trial] = field(default_factory=list)
+    rivals: list[dict[str, object]] = field(default_factory=list)
+    liar: str | None = None
+    screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
+    budget: Budget = field(default_factory=Budget)
+
+    @property
+    def whole(self) -> bool:
+        """Whether hypotheses are tried on whole runs."""
+        return len(self.here.runs) == len(self.problem.runs)
+
+    def adopt(self, tried: Trials, chosen: Trial) -> None:
+        """Go on with ``chosen`` in the model; the other likely ones are its rivals."""
+        self.found.append(chosen)
+        self.rivals += [rival(t, chosen) for t in tried.done if t is not chosen]
+        self.here, self.evaluation = adopted(self.here, self.evaluation, chosen)
+
+
+def short_pieces(ideal: Ideal) -> tuple[Problem, Evaluation | None] | None:
+    """The short pieces that the cautious fit was made to, and where it ended; None where there was none."""
+    if ideal.pieces is None or ideal.careful is None:
+        return None
+    here = with_reference(ideal.pieces, ideal.fitted.rest)
+    return here, evaluate(here, ideal.careful[1].point)

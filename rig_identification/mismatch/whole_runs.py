@@ -1,0 +1,95 @@
+"""Whole runs with what was found in the model: fitted, judged on held-out runs, pruned and told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import ORDINARY, Ideal, judged, parameter_estimates
+from rig_identification.estimate.solve import Point, Problem
+from rig_identification.estimate.verdict import hear, weighed_otherwise
+from rig_identification.estimate.whole import fit_whole
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
+from rig_identification.mismatch.findings import finding
+from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.search import needed_gain
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial, beyond_doubt, strength
+from rig_identification.result import Finding, Mismatch
+
+#: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
+FIRM = 10.0
+
+
+def whole_runs(ideal: Ideal, search: Search) -> Explained:
+    return _fitted_whole(ideal, search, search.found, search.here, search.evaluation.point)
+
+
+def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Problem, known: Point) -> Explained:
+    """Whole runs with the effects ``found``, from a ``known`` point of the problem ``here``."""
+    whole = extended(search.problem, tuple(t.candidate for t in found))
+    point = replace(known, theta=carried(whole, here, known).theta)
+    fitted = fit_whole(ideal.fitted, whole, here, point)
+    # What says most comes first, whatever was found first
+    found = sorted(found, key=lambda t: -strength(_at(fitted, t)))
+    after, verdict = judged(fitted)
+    # What the ground scale contradicts is no trace, though it is one number among a hundred thousand
+    trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None
+    heard = hear(fitted) if trace and only_a_trace(ideal.fitted, fitted) else None
+    trace = heard is not None and not heard.contradicted
+    loose = heard.looseness if heard is not None and trace else 1.0
+    findings = _findings(ideal, fitted, found, after.holdout, loose)
+    named = ", ".join(f.effect for f in findings)
+    errors = held_out_errors(ideal.scores.holdout, after.holdout)
+    if verdict.verdict == "none":
+        told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
+    elif trace:
+        told, text = "explained", f"{named} explains all but a trace. {errors} {verdict.explanation}"
+    else:
+        told = "unexplained"
+        text = f"{named} explains part of it; something is left. {verdict.explanation}"
+    return Explained(fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace)
+
+
+def _at(fitted: Fitted, trial: Trial) -> Trial:
+    """A trial whose effect is in a fit's model, as that fit has it."""
+    return replace(trial, problem=fitted.problem, evaluation=fitted.evaluation)
+
+
+def pruned(best: Explained, search: Search, count: int) -> Explained:
+    """The explanation less what it can do without: an early effect may only have stood in for a later one."""
+    kept = list(search.found)
+    ordinary = {p.name: p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
+    while len(kept) > 1:
+        fitted = best.fitted
+        here = [_at(fitted, t) for t in kept]
+        strengths = [
+            strength(t) / needed_gain(t.candidate, count) if beyond_doubt(t, ordinary, ORDINARY) else 0.0
+            for t in here
+        ]
+        for i in np.argsort(strengths):
+            if strengths[i] > FIRM:
+                return best
+            less = [t for k, t in enumerate(kept) if k != i]
+            again = _fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
+            if again.mismatch.verdict == "explained":
+                best, kept = again, less
+                break
+        else:
+            return best
+    return best
+
+
+def _findings(
+    ideal: Ideal, fitted: Fitted, found: list[Trial], after: float | None, loose: float
+) -> tuple[Finding, ...]:
+    """The effects in the recording contract's words. loose: factor on their variances."""
+    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
+    evidence = evidence_of(ideal, fitted, after)
+    values = {p.name: p.value for p in parameters}
+    # An error beyond what is ordinary comes on top of an ordinary one, and only their sum is seen
+    ordinary = {p.name: p.prior_std for p in ideal.fitted.problem.bench.parameters.free}
+    stds = {p.name: float(np.sqrt(loose * p.std**2 + ordinary.get(p.name, 0.0) ** 2)) for p in parameters}
+    return tuple(finding(t, values, stds, evidence) for t in found)
