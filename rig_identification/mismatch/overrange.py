@@ -66,5 +66,6 @@ def with_overranges(mismatch: Mismatch, session: Session) -> Mismatch:
         return mismatch
     verdict, text = mismatch.verdict, mismatch.explanation
     if verdict == "none":
-        verdict, text = "explained", f"With what sensors read at the end of their range left out: {text}"
+        verdict = "explained"
+        text = f"With what sensors read at the end of their range left out, {text[:1].lower()}{text[1:]}"
     return replace(mismatch, verdict=verdict, explanation=text, findings=(*mismatch.findings, *found))
