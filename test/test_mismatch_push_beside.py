@@ -1,0 +1,62 @@
+"""A push that the recorded force does not know, beside a gyroscope's bias that is larger everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_simulate_identify import shaken
+
+from rig_identification.mismatch.identify import identify
+from rig_identification.recording import Recording, Session
+from rig_identification.simulate import simulate_session
+
+BIAS = 0.012  # rad/s about x, some hundred samples' noise
+PUSH, START, LASTS = 120.0, 14.0, 1.2  # N at the peak along the exciter's z; s
+
+
+def _biased(recording: Recording) -> Recording:
+    if recording.imu is None:
+        return recording
+    values = recording.imu.values.copy()
+    values[:, 0] += BIAS
+    return replace(recording, imu=replace(recording.imu, values=values))
+
+
+def _pushed(recording: Recording) -> Recording:
+    """The recording as if part of its force had come from outside: the exciter's cell did not feel it."""
+    force = recording.exciter_force
+    assert force is not None
+    phase = (force.time - START) / LASTS
+    pulse = np.where((phase > 0.0) & (phase < 1.0), PUSH * np.sin(np.pi * np.clip(phase, 0.0, 1.0)), 0.0)
+    values = force.values.copy()
+    values[:, 2] -= pulse
+    return replace(recording, exciter_force=replace(force, values=values))
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    spec = shaken(14, 24.0)
+    (run,) = spec.runs
+    other = replace(run, name="run_2", holdout=True, duration=12.0)
+    made = simulate_session(replace(spec, runs=(run, other)), np.random.default_rng(8))[0]
+    recordings = tuple(_biased(_pushed(r) if r.name == "run_1" else r) for r in made.recordings)
+    return replace(made, recordings=recordings)
+
+
+def test_both_are_named(session: Session) -> None:
+    found = identify(session)
+    mismatch = found.mismatch
+    assert mismatch.verdict == "explained"
+    bias, push = mismatch.findings
+    assert (bias.effect, bias.where["channel"], bias.where["axis"]) == ("imu_bias", "imu", "x")
+    assert bias.parameters["angular_rate"]["value"] == pytest.approx(BIAS, abs=1e-3)
+    assert push.effect == "external_force"
+    (times,) = push.where["times"]  # type: ignore[misc]
+    assert times["recording"] == "run_1"
+    assert times["start"] < START + LASTS
+    assert times["end"] > START
+    assert found.holdout_error is not None
+    assert found.holdout_error < 1.1
+    assert "push" in mismatch.explanation
