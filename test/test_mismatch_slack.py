@@ -10,7 +10,14 @@ from test_estimate_prediction import recorded
 from test_model_rigs import random_sample
 
 from rig_identification.estimate.evidence import Run, prepare
-from rig_identification.mismatch.slack import Spell, shocks, slack_finding, slack_spells, taut_stretches
+from rig_identification.mismatch.slack import (
+    Spell,
+    blows,
+    shocks,
+    slack_finding,
+    slack_spells,
+    taut_stretches,
+)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +81,19 @@ def test_a_snap_between_two_samples_is_a_shock(run: Run) -> None:
     (shock,) = shocks(replace(run, channels=tuple(channels)))
     assert shock.cable == c.device
     assert shock.start <= c.time[at] <= shock.end < shock.start + 0.2
+
+
+def test_what_jumps_before_any_cable_was_slack_is_no_blow(run: Run) -> None:
+    c = run.channels[0]
+    values = c.values.copy()
+    for moment in (1.0, 5.0):
+        values[int(np.searchsorted(c.time, moment))] += 300.0
+    jumping = replace(run, channels=(replace(c, values=values), *run.channels[1:]))
+    assert len(shocks(jumping)) == 2
+    spell = Spell(c.device, run.recording.name, 4.0, 4.2)
+    (blow,) = blows((jumping,), [spell])
+    assert blow.start == pytest.approx(5.0, abs=0.05)
+    assert blows((jumping,), [replace(spell, recording="another")]) == []
 
 
 def test_spells_of_several_cables_at_once_are_told_once() -> None:

@@ -13,7 +13,7 @@ from rig_identification.mismatch.named import named
 from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
 from rig_identification.mismatch.screen import screen, with_reference
 from rig_identification.mismatch.search import catalogue, count_of, worth_a_fit
-from rig_identification.mismatch.slack import Spell, taut_ideal, with_slack
+from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
 
@@ -33,7 +33,7 @@ def explain(ideal: Ideal, spells: list[Spell], notify: Notify) -> Explained | No
     notify("search: stretches in which every cable pulls", 0.02)
     taut = taut_ideal(ideal, spells, notify)
     if taut is None:
-        return _explain(ideal, notify)
+        return slack_alone(ideal, spells)
     if not near_noise(taut.fitted):
         taut = with_pieces(taut, notify)
     found = _explain(taut, notify)

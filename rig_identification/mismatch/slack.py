@@ -144,12 +144,32 @@ def spells_of(fitted: Fitted) -> list[Spell]:
     return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
 
 
+def blows(runs: tuple[Run, ...], spells: list[Spell]) -> list[Spell]:
+    """Shocks by which cables come taut again: there is none before the first that went slack."""
+    first = {
+        name: min(s.start for s in spells if s.recording == name) for name in {s.recording for s in spells}
+    }
+    return [
+        shock
+        for run in runs
+        for shock in (shocks(run) if run.recording.name in first else [])
+        if shock.end >= first[shock.recording]
+    ]
+
+
+def slack_alone(ideal: Ideal, spells: list[Spell]) -> Explained:
+    """The spells, and that they leave nothing to fit."""
+    slack = replace(slack_finding(spells), evidence=evidence_of(ideal, ideal.fitted, ideal.scores.holdout))
+    text = f"Cables go slack so often that no stretch in which all of them pull lasts {SHORTEST:g} s. "
+    mismatch = Mismatch("unexplained", text + ideal.mismatch.explanation, (slack,), ())
+    return Explained(ideal.fitted, mismatch, ideal, hear(ideal.fitted).looseness)
+
+
 def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | None:
     """The ideal model fitted between the spells, from where nothing is bent; None where nothing is left."""
     fitted = ideal.fitted
-    slack = {s.recording for s in spells}
     every = (*fitted.problem.runs, *fitted.holdout_runs)
-    loose = [*spells, *(s for run in every if run.recording.name in slack for s in shocks(run))]
+    loose = [*spells, *blows(every, spells)]
     runs = tuple(part for run in fitted.problem.runs for part in taut_stretches(run, loose))
     held = tuple(part for run in fitted.holdout_runs for part in taut_stretches(run, loose))
     if not runs:
