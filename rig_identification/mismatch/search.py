@@ -241,11 +241,9 @@ def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
     """Whether a hypothesis is no rival of those that reached the noise, by its first steps."""
     if far:
         return excess(trial.evaluation) > RIVAL * excess(first.evaluation)
-    best = max(t.evidence for t in done) - BEATEN
-    if trial.settled or trial.evidence > best:
-        return trial.evidence < best
     # A curved valley takes more steps than the first ones
-    return trial.evidence + still_promised(trial.problem, trial.evaluation) < best
+    ahead = 0.0 if trial.settled else still_promised(trial.problem, trial.evaluation)
+    return trial.evidence + ahead < max(t.evidence for t in done) - BEATEN
 
 
 def begun(
