@@ -415,7 +415,8 @@ def solve(
             wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
             gain = _promised(current, change)
-            if gain < tolerance and damping <= 1e-3:
+            # Along a flat valley the least damping takes all promise away: an undamped step tells the end
+            if gain < tolerance and damping <= 1e-3 and still_promised(problem, current) < tolerance:
                 return current, not on_plateau(current)
             if damping > 1e-3 and gain < polish * excess(current):
                 # Held back so much, no step can win what would be worth it
@@ -441,7 +442,7 @@ def solve(
                 if idle and (damping <= 1e-3 or idle == IDLE):
                     return current, damping <= 1e-3 and not on_plateau(current)
                 break
-            if gain < CLOSE and damping <= 1e-3:
+            if gain < CLOSE and damping <= 1e-3 and still_promised(problem, current) < CLOSE:
                 return current, not on_plateau(current)
             failed, turned_back = max(failed, damping), True
             damping = max(damping, 1e-6) * BRAKED

@@ -43,6 +43,7 @@ def named(ideal: Ideal, search: Search, notify: Notify, beside_push: Beside) -> 
             lambda label, at=at: notify(f"search: {label}", at),  # type: ignore[misc]
             search.screened,
             search.budget,
+            more=step + 1 < MOST_EFFECTS,
         )
         search.screened = None
         search.liar = search.liar or tried.liar

@@ -52,6 +52,8 @@ AT_NOISE = 1.05
 RIVAL = 10.0
 #: Share of what was left up to which a hypothesis, after its first steps, is fitted to its end at once.
 ALMOST = 0.05
+#: Hypotheses that are tried on top of another one, which leaves something.
+FURTHER = 2
 #: Share of what is left that counts as the larger part of it.
 CHIEF = 0.5
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
@@ -150,6 +152,7 @@ def trials(
     notify: Notify,
     screened: list[Promise] | None = None,
     budget: Budget | None = None,
+    more: bool = False,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
@@ -157,7 +160,7 @@ def trials(
     that had come as close. Where much is left and no hypothesis takes it away that promised to, first order
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
     tried whatever screening says. screened: promises about this evaluation, where they are known. Where the
-    budget is spent nothing more that changes the model is begun.
+    budget is spent nothing more that changes the model is begun. more: another effect may be added after.
     """
     budget = budget or Budget()
     mass = mass_of(problem, evaluation)
@@ -171,6 +174,10 @@ def trials(
     if not far or (promises and promises[0].share > DIRECT):
         tried = begun(here, seen, worth_a_fit(promises, count), far, notify, budget)
     device, needed = None, log_evidence(seen) + MEANT
+    if far and more and not any(_at_noise(t) for t in tried):
+        lead = _leading(tried, seen, candidates, mass, notify)
+        if lead is not None:
+            return Trials([lead])
     if far and not any(_at_noise(t) for t in tried):
         liar = None
         if problem.bench.parameters.model.internal == 0:
@@ -224,6 +231,35 @@ def trials(
     return Trials(told_apart(done, MEANT), device, tuple(beaten))
 
 
+def _leading(
+    tried: list[Trial], before: Evaluation, candidates: list[Candidate], mass: float, notify: Notify
+) -> Trial | None:
+    """The hypothesis with which, and with one more, nothing is left; None where there is none.
+
+    Of two effects at once the one that takes most away alone may be neither: what bends to both does. What
+    is left with either of the two shows the other one plainly.
+    """
+    best: tuple[float, Trial] | None = None
+    for trial in sorted(tried, key=lambda t: excess(t.evaluation))[:FINISHED]:
+        if excess(trial.evaluation) > CHIEF * excess(before):
+            continue
+        first = finished(trial)
+        if first is None:
+            continue
+        notify(f"{first.candidate.label}, and one more")
+        others = [c for c in candidates if c.label != first.candidate.label]
+        promises = screen(first.problem, first.evaluation, others, mass)
+        for promise in worth_a_fit(promises, count_of(others))[:FURTHER]:
+            if promise.share < DIRECT or promise.candidate.build is not None:
+                continue
+            second = attempt(first.problem, first.evaluation, promise)
+            if second is None or not _at_noise(second):
+                continue
+            if best is None or second.evidence > best[0]:
+                best = second.evidence, first
+    return None if best is None else best[1]
+
+
 def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
     """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie."""
     worthy = [p for p in promises if p.gain > needed_gain(p.candidate, count)]
@@ -256,7 +292,7 @@ def begun(
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
-    reached, kept, done = 0.0, 0.0, False
+    reached, kept, done, enough = 0.0, 0.0, False, False
     slow = gives_way(problem.bench.parameters.model)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
@@ -273,8 +309,8 @@ def begun(
         if not far and done and promise.candidate.build is not None and promise.gain < kept:
             # Another one took away all there was: what changes the model, and promised less, is no likelier
             continue
-        if far and promise.candidate.build is not None and promise.gain < CLOSE * reached:
-            # Another hypothesis left nothing already, and much more was expected of it
+        if far and promise.candidate.build is not None and (enough or promise.gain < CLOSE * reached):
+            # Another hypothesis left nothing already, and much more was expected of it; or it was not the first
             continue
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise)
@@ -287,6 +323,5 @@ def begun(
             done = done or excess(trial.evaluation) < BEATEN
             if far and _at_noise(trial):
                 reached = max(reached, promise.gain)
-                if promise is not worthy[0]:
-                    break
+                enough = promise is not worthy[0]
     return out
