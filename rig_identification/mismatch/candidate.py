@@ -55,3 +55,8 @@ class Candidate:
             return self.tell(values, stds)
         first = self.parameters[0]
         return {self.name_in_result: (values[first.name], stds[first.name], first.unit)}
+
+
+def added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -> Parameter:
+    """A number that a hypothesis adds to the model: entry ``entry`` of its physics."""
+    return Parameter(name, unit, nominal, std, "physics", entry, bounded=False)

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter, ParameterSet
+from rig_identification.estimate.parameters import INERTIAL, ParameterSet
 from rig_identification.estimate.solve import Evaluation, Point, Problem
-from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.mismatch.candidate import Candidate, Told, added
+from rig_identification.mismatch.tethers import tethers
 from rig_identification.model import layout
 from rig_identification.model.body import (
     can_exist,
@@ -25,61 +26,6 @@ from rig_identification.rig import Rig
 
 #: Std of the logarithm of the rate at which dry hinges creep: a factor of three to either side.
 CREEP_SPREAD = 1.1
-#: Length (m) of a hose that pulls as hard as any would and resists sideways most.
-SHORT_HOSE = 1.0
-
-
-def added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -> Parameter:
-    return Parameter(name, unit, nominal, std, "physics", entry, bounded=False)
-
-
-def _tether(
-    axes: str, block: int, mass: float, gravity: float, length: float, size: float, middle: np.ndarray
-) -> Candidate:
-    """A tether that pulls along ``axes``: along one as a taut hose does, along all as one that hangs.
-
-    What is taut resists sideways as well, by its pull over its length F0/l alike to both sides: too little to
-    show by itself, and enough to stand for a centre of mass that lies millimetres higher.
-    """
-    spring, pull = 0.2 * mass * gravity / length, 0.02 * mass * gravity
-    parts = [
-        added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
-        for what, unit, std, entry in (
-            ("stiffness", "N/m", spring, place.TETHER_STIFFNESS),
-            ("pull", "N", pull, place.TETHER_PULL),
-        )
-        for a in axes
-    ]
-    if len(axes) == 1:
-        first, second = (block + place.TETHER_STIFFNESS + i for i, a in enumerate(AXES) if a != axes)
-        aside = added("tether.sideways", "N/m", pull / SHORT_HOSE, first)
-        parts.append(replace(aside, also=(second,)))
-    parts += [
-        added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
-        for i, a in enumerate(AXES)
-    ]
-
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        stiff = {a: values[f"tether.stiffness.{a}"] for a in axes}
-        main = max(stiff, key=lambda a: abs(stiff[a]))
-        out: Told = {"stiffness": (stiff[main], stds[f"tether.stiffness.{main}"], "N/m")}
-        for p in parts:
-            _, what, *a = p.name.split(".")
-            if what == "point" or len(axes) > 1:
-                out["_".join([what, *a])] = (values[p.name], stds[p.name], p.unit)
-            elif what == "pull":
-                out["preload"] = (abs(values[p.name]), stds[p.name], p.unit)
-        return out
-
-    return Candidate(
-        "tether",
-        tuple(parts),
-        "A hose or wire pulls on the body with a stiffness of {value}.",
-        "Let cables and hoses hang free in a long loop, or take them off.",
-        {"channel": None, "axis": axes if len(axes) == 1 else None},
-        positive=len(axes),
-        tell=told,
-    )
 
 
 def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidate]:
@@ -94,7 +40,6 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     length = float(np.mean([c.length for c in rig.cables]))
     size = float(np.max(extent(rig)))
     speed = np.sqrt(rig.gravity * length)
-    middle = np.mean([c.body_point for c in rig.cables], axis=0) - [0.0, 0.0, 0.3 * size]
 
     def rubbing(values: dict[str, float], stds: dict[str, float]) -> Told:
         return {
@@ -157,7 +102,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             positive=1,
             name_in_result="linear_density",
         ),
-        *(_tether(axes, block, mass, rig.gravity, length, size, middle) for axes in (*AXES, AXES)),
+        *tethers(rig, mass),
     ]
     if rig.exciter is not None:
         out.append(

@@ -71,7 +71,7 @@ def named(ideal: Ideal, search: Search, notify: Notify, beside_push: Beside) -> 
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best
-        elif near_noise(best.fitted):
+        if near_noise(best.fitted):
             again = _second_choice(ideal, before, tried, notify)
             if again is not None:
                 return pruned(again[0], again[1], len(candidates))

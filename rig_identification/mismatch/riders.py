@@ -74,10 +74,10 @@ def middle_of(rig: Rig) -> Array:
     return np.asarray(np.mean(points, axis=0) - [0.0, 0.0, 0.35 * size[2] + 0.15 * float(np.max(size))])
 
 
-def _filters(frequency: float, step: float) -> tuple[Array, Array]:
+def filters(frequency: float, step: float, damping: float = DAMPING) -> tuple[Array, Array]:
     """Discrete filter from specific force along d to the travel q, its input linear between nodes."""
     omega = 2.0 * np.pi * frequency
-    system = ([-1.0], [1.0, 2.0 * DAMPING * omega, omega**2])
+    system = ([-1.0], [1.0, 2.0 * damping * omega, omega**2])
     numerator, denominator, _ = cont2discrete(system, step, method="foh")
     return np.atleast_2d(numerator)[0], np.asarray(denominator)
 
@@ -129,7 +129,7 @@ def travels(force: Array, gravity: Array, step: float) -> dict[tuple[str, float]
     for i, axis in enumerate(AXES):
         for frequency in FREQUENCIES:
             omega = 2.0 * np.pi * frequency
-            numerator, denominator = _filters(frequency, step)
+            numerator, denominator = filters(frequency, step)
             # Displaced by its weight before the start: the deviation from there starts from zero
             before = gravity[0, i] / omega**2
             away = np.asarray(lfilter(numerator, denominator, force[:, i] + gravity[0, i]))
@@ -139,7 +139,7 @@ def travels(force: Array, gravity: Array, step: float) -> dict[tuple[str, float]
     return out
 
 
-def _pieces_of(problem: Problem) -> dict[str, list[int]]:
+def pieces_of(problem: Problem) -> dict[str, list[int]]:
     """Runs of a problem by recording, in order of time."""
     groups: dict[str, list[int]] = {}
     for i, run in enumerate(problem.runs):
@@ -155,7 +155,7 @@ def rider_wrenches(problem: Problem, evaluation: Evaluation) -> dict[int, Array]
     R_rest = model.physics[first : first + 9].reshape(3, 3)
     middle = middle_of(rig)
     out: dict[int, Array] = {}
-    for which in _pieces_of(problem).values():
+    for which in pieces_of(problem).values():
         raw = np.concatenate(
             [evaluation.runs[i].motion.outputs[: None if i == which[-1] else -1] for i in which]
         )

@@ -14,27 +14,39 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
+from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.response import whitened_response
-from rig_identification.mismatch.riders import SWINGS, WIDTH, middle_of, rider_candidate, rider_wrenches
+from rig_identification.mismatch.rider_places import finer, spread_of
+from rig_identification.mismatch.riders import (
+    SWINGS,
+    WIDTH,
+    Swing,
+    middle_of,
+    rider_candidate,
+    rider_wrenches,
+)
 from rig_identification.mismatch.supports import (
     cable_elasticity,
     ceiling_candidate,
     gives_way,
     largest_compliance,
 )
+from rig_identification.mismatch.tethers import placed_tethers
 from rig_identification.model.effects import place
 from rig_identification.model.layout import effects_offset
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
+
+#: Directions of riders that are looked at more finely, best first.
+FINER = 2
 
 
 @dataclass(frozen=True)
@@ -107,7 +119,11 @@ def screen(
     out = [_promise(wide, point, full, base, c) for c in candidates]
     for probe in (_promise(wide, point, full, base, c) for c in probes):
         out += _supports(problem, mass, probe)
-    out += _riders(problem, full, base, wide.bench.parameters.size, mass)
+    beyond = Beyond(full, base, wide.bench.parameters.size)
+    placed = [Promise(*promise) for promise in placed_tethers(wide, full, beyond, candidates)]
+    instead = {p.candidate.label for p in placed}
+    out = [*(p for p in out if p.candidate.label not in instead), *placed]
+    out += _riders(problem, beyond, mass)
     left = max(1.0, excess(full) - _gain(full.information, full.gradient, base))
     out = [replace(promise, share=promise.gain / left) for promise in out]
     return sorted(out, key=lambda promise: -promise.gain)
@@ -183,33 +199,12 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
     return out
 
 
-def _riders(
-    problem: Problem, full: Evaluation, base: NDArray[np.int64], size: int, mass: float
-) -> list[Promise]:
+def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     """The best swing of each direction."""
+    full = beyond.full
     wrenches = rider_wrenches(problem, full)
-    count = WIDTH * len(SWINGS)
-    total = full.information.shape[0]
-    cross, own, gradient = np.zeros((total, count)), np.zeros((len(SWINGS), WIDTH, WIDTH)), np.zeros(count)
-    place_ = size
-    responses = []
-    for i, run in enumerate(full.runs):
-        columns = whitened_response(run, wrenches[i])
-        responses.append(columns)
-        starts = run.jacobian.shape[1] - size
-        rows = np.concatenate([np.arange(size), np.arange(place_, place_ + starts)])
-        cross[rows] += run.jacobian.T @ columns
-        gradient += columns.T @ run.residual
-        for k in range(len(SWINGS)):
-            mine = columns[:, WIDTH * k : WIDTH * (k + 1)]
-            own[k] += mine.T @ mine
-        place_ += starts
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[base], 1e-300))
-    inside = full.information[np.ix_(base, base)] * np.outer(scale, scale)
-    factor = cho_factor(inside + 1e-12 * np.eye(base.size))
-    seen = scale[:, None] * cross[base]
-    solved = cho_solve(factor, seen)
-    left = gradient - solved.T @ (scale * full.gradient[base])
+    responses = [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(full.runs)]
+    found = beyond.of(responses)
     center = middle_of(problem.bench.rig)
     far = 0.5 * float(np.max(extent(problem.bench.rig)))
     # Columns of a mass at the middle, and of its distance from there
@@ -219,8 +214,9 @@ def _riders(
     near = misfit(full) < NEAR_SQUARE
     for k, swing in enumerate(SWINGS):
         chosen = slice(WIDTH * k, WIDTH * (k + 1))
-        matrix = about.T @ (own[k] - seen[:, chosen].T @ solved[:, chosen]) @ about
-        right = about.T @ left[chosen]
+        own = sum(r[:, chosen].T @ r[:, chosen] for r in responses)
+        matrix = about.T @ (own - found.seen[:, chosen].T @ found.solved[:, chosen]) @ about
+        right = about.T @ found.right[chosen]
         alone = right[0] / (matrix[0, 0] + 1.0 / (0.05 * mass) ** 2)
         if alone <= 0.0:
             continue
@@ -229,31 +225,46 @@ def _riders(
         gain = 0.5 * float(step @ right)
         kind = swing.effect, swing.directions
         if step[0] > 0.0 and near and (kind not in best or gain > best[kind].gain):
-            amounts = about @ step
-            own_part = scale * cho_solve(factor, scale * full.gradient[base] - seen[:, chosen] @ amounts)
-            moved = np.zeros(total)
-            moved[base] = own_part
-            residuals = _left(full, size, moved, [r[:, chosen] @ amounts for r in responses])
-            gain -= unearned_of(problem, full, full.runs, residuals)
+            gain -= _unearned(problem, beyond, found, chosen, about @ step, responses)
         if step[0] <= 0.0 or (kind in best and gain <= best[kind].gain):
             continue
         at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
         candidate, values = rider_candidate(problem, swing, mass, float(step[0]), at)
         best[kind] = Promise(candidate, gain, values)
-    swinging = max((p.gain for (effect, _), p in best.items() if effect != "loose_mass"), default=0.0)
+    smooth = sorted((kind for kind in best if kind[0] != "loose_mass"), key=lambda kind: -best[kind].gain)
+    for kind in smooth[:FINER]:
+        best[kind] = max(best[kind], *_finer(problem, beyond, best[kind], mass), key=lambda p: p.gain)
+    swinging = max((best[kind].gain for kind in smooth), default=0.0)
     # Blows against stops look like nothing else: where what swings smoothly promises more nothing is loose,
     # and the slowest fit of all is saved
     return [p for (effect, _), p in best.items() if effect != "loose_mass" or p.gain > swinging]
 
 
-def _left(full: Evaluation, size: int, step: Array, taken: list[Array]) -> list[Array]:
-    """Residuals of all runs after a ``step`` of all unknowns, less what else takes away, to first order."""
-    out, place_ = [], size
-    for run, less in zip(full.runs, taken, strict=True):
-        end = place_ + run.jacobian.shape[1] - size
-        out.append(run.residual - run.jacobian @ np.concatenate([step[:size], step[place_:end]]) - less)
-        place_ = end
-    return out
+def _finer(problem: Problem, beyond: Beyond, coarse: Promise, mass: float) -> list[Promise]:
+    """A rider's promise at its best frequency, damping and place."""
+    effect = coarse.candidate.effect
+    frequency = next(p.nominal for p in coarse.candidate.parameters if p.name == f"{effect}.frequency")
+    axis = coarse.candidate.where["axis"]
+    found = finer(problem, beyond, Swing("xy" if axis is None else str(axis), frequency), mass)
+    if found is None:
+        return []
+    swing, damping, best, columns, responses = found
+    gain = best.gain
+    if misfit(beyond.full) < NEAR_SQUARE:
+        residuals = beyond.residuals(columns, best.weights, responses)
+        gain -= unearned_of(problem, beyond.full, beyond.full.runs, residuals)
+    at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
+    candidate, values = rider_candidate(problem, swing, mass, float(best.amounts[0]), at)
+    return [Promise(candidate, gain, values | {f"{effect}.damping_ratio": damping})]
+
+
+def _unearned(
+    problem: Problem, beyond: Beyond, found: Columns, chosen: slice, amounts: Array, responses: list[Array]
+) -> float:
+    """What of a gain near the noise no motion accounts for."""
+    part = Columns(found.seen[:, chosen], found.solved[:, chosen], found.right[chosen])
+    residuals = beyond.residuals(part, amounts, [r[:, chosen] for r in responses])
+    return unearned_of(problem, beyond.full, beyond.full.runs, residuals)
 
 
 def _solve(information: Array, gradient: Array) -> Array:

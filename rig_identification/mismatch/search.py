@@ -240,9 +240,12 @@ def _leading(
     is left with either of the two shows the other one plainly.
     """
     best: tuple[float, Trial] | None = None
-    for trial in sorted(tried, key=lambda t: excess(t.evaluation))[:FINISHED]:
+    for trial in sorted(tried, key=lambda t: (t.candidate.build is not None, excess(t.evaluation))):
         if excess(trial.evaluation) > CHIEF * excess(before):
             continue
+        if best is not None and trial.candidate.build is not None:
+            # What changes the model and is fitted slowly may bend to anything
+            break
         first = finished(trial)
         if first is None:
             continue
@@ -296,7 +299,11 @@ def begun(
     slow = gives_way(problem.bench.parameters.model)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
-        worthy = sorted(worthy, key=lambda p: (p.candidate.build is not None, -p.gain))
+        most = max((p.gain for p in worthy), default=0.0)
+        worthy = sorted(
+            worthy,
+            key=lambda p: (p.candidate.build is not None or p.gain < CLOSE * most, -p.gain),
+        )
     for promise in worthy:
         if promise.candidate.build is not None and promise.share < CHIEF and slow:
             # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
@@ -310,7 +317,7 @@ def begun(
             # Another one took away all there was: what changes the model, and promised less, is no likelier
             continue
         if far and promise.candidate.build is not None and (enough or promise.gain < CLOSE * reached):
-            # Another hypothesis left nothing already, and much more was expected of it; or it was not the first
+            # Another one left nothing already, and much more was expected of it, or it was not the first
             continue
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise)

@@ -12,8 +12,7 @@ from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import believed_point
 from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem
-from rig_identification.mismatch.candidate import Candidate, Told
-from rig_identification.mismatch.left_out_physics import added
+from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel

@@ -32,6 +32,8 @@ ABSURD = 3.0
 #: Steps of a first, short fit (more where the model itself changes) and of one to the end.
 FIRST_STEPS = 4
 CHANGED_STEPS = 7
+#: Steps in which a fit that starts at a promise has to be back where it fits better than without.
+RETURNING_STEPS = 5
 LAST_STEPS = 20
 #: Share of their prior's std within which such ratios are held at first.
 HELD = 0.05
@@ -116,12 +118,9 @@ def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial
     try:
         if candidate.build is not None:
             point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE)
+            fitted, settled = _first_steps(wide, point, CHANGED_STEPS, candidate)
         else:
-            point = _nearer(wide, point, begun)
-        steps = FIRST_STEPS if candidate.build is None else CHANGED_STEPS
-        fitted, settled = solve(
-            wide, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=_bends(candidate)
-        )
+            fitted, settled = _from_promise(wide, point, begun, candidate)
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
@@ -132,14 +131,29 @@ def _bends(candidate: Candidate) -> bool:
     return candidate.effect != "loose_mass"
 
 
-def _nearer(problem: Problem, promised: Point, begun: Point) -> Point:
-    """Where a fit starts that does not change the model: at what screening promised, unless that fits worse.
+def _first_steps(problem: Problem, point: Point, steps: int, candidate: Candidate) -> tuple[Evaluation, bool]:
+    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=_bends(candidate))
 
-    A promise holds where all that is fitted moves with it, to first order. Far off, over a run of half a
-    minute, that may be thrown out by more than the whole effect, and the way there is walked step by step.
+
+def _from_promise(
+    problem: Problem, promised: Point, begun: Point, candidate: Candidate
+) -> tuple[Evaluation, bool]:
+    """First steps of a fit that does not change the model.
+
+    A promise holds where all that is fitted moves with it, to first order. By itself, over half a minute, it
+    throws everything out by more than the whole effect; yet Gauss-Newton steps from there are soon back on
+    the valley's floor, far along it, where descent from where the fit stands follows every bend. Where they
+    are not, that is what is left to do.
     """
     there, here = (evaluate(problem, p, residuals_only=True) for p in (promised, begun))
-    return begun if there is None or (here is not None and here.cost < there.cost) else promised
+    if there is None:
+        return _first_steps(problem, begun, FIRST_STEPS, candidate)
+    if here is None or there.cost <= here.cost:
+        return _first_steps(problem, promised, FIRST_STEPS, candidate)
+    fitted, settled = _first_steps(problem, promised, RETURNING_STEPS, candidate)
+    if fitted.cost > here.cost:
+        return _first_steps(problem, begun, FIRST_STEPS, candidate)
+    return (fitted, settled) if settled else _first_steps(problem, fitted.point, FIRST_STEPS, candidate)
 
 
 def promised(

@@ -1,0 +1,67 @@
+"""What columns that stand in no model say beyond all that is free anyway: the Schur complement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from rig_identification.estimate.solve import Evaluation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of a whitened Jacobian with all that is free anyway eliminated."""
+
+    seen: Array  # (b, c): scaled base against columns
+    solved: Array  # (b, c): what of them the base takes
+    right: Array  # (c,): gradient that is left
+
+
+class Beyond:
+    """A linearised problem of which the unknowns ``base`` are free.
+
+    full: Evaluation whose unknowns are ``size`` parameters and then each run's start. base (b,): indices.
+    """
+
+    def __init__(self, full: Evaluation, base: NDArray[np.int64], size: int) -> None:
+        self.full, self.base, self.size = full, base, size
+        self._scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[base], 1e-300))
+        inside = full.information[np.ix_(base, base)] * np.outer(self._scale, self._scale)
+        self._factor = cho_factor(inside + 1e-12 * np.eye(base.size))
+
+    def of(self, runs: Sequence[Array], rests: Sequence[Array] = ()) -> Columns:
+        """Columns (m, c) of every run, and of every rest pose where they show there."""
+        count, place = runs[0].shape[1], self.size
+        cross, gradient = np.zeros((self.full.information.shape[0], count)), np.zeros(count)
+        for run, columns in zip(self.full.runs, runs, strict=True):
+            starts = run.jacobian.shape[1] - self.size
+            rows = np.concatenate([np.arange(self.size), np.arange(place, place + starts)])
+            cross[rows] += run.jacobian.T @ columns
+            gradient += columns.T @ run.residual
+            place += starts
+        for rest, columns in zip(self.full.rests, rests, strict=False):
+            cross[: self.size] += rest.jacobian.T @ columns
+            gradient += columns.T @ rest.residual
+        seen = self._scale[:, None] * cross[self.base]
+        solved = cho_solve(self._factor, seen)
+        own = self._scale * self.full.gradient[self.base]
+        return Columns(seen, solved, gradient - solved.T @ own)
+
+    def residuals(self, columns: Columns, amounts: Array, runs: Sequence[Array]) -> list[Array]:
+        """Residuals (m,) of every run after the best step with ``amounts`` (c,) of the columns ``runs``."""
+        rest = self._scale * self.full.gradient[self.base] - columns.seen @ amounts
+        step = np.zeros(self.full.information.shape[0])
+        step[self.base] = self._scale * cho_solve(self._factor, rest)
+        out, place = [], self.size
+        for run, own in zip(self.full.runs, runs, strict=True):
+            end = place + run.jacobian.shape[1] - self.size
+            change = np.concatenate([step[: self.size], step[place:end]])
+            out.append(run.residual - run.jacobian @ change - own @ amounts)
+            place = end
+        return out

@@ -1,0 +1,122 @@
+"""Effects that act at some place of the body: the place at which they explain most, to first order.
+
+A hose's force follows the motion of the point that it pulls at and turns the body about an arm to that point;
+a rider feels the acceleration of its place and pushes there. Columns of such amounts are polynomials of
+second degree in the place u, given from the body's middle in units of some spread: with ten of them for each
+amount every place of the body is tried at the price of a few. About the middle alone a hose at a corner
+promises next to nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Places tried along each axis at first, and about the best of them in each of so many finer rounds.
+COARSE, FINE, ROUNDS = 9, 5, 3
+#: Monomials of a place up to the second degree.
+TERMS = 10
+
+
+def monomials(u: Array) -> Array:
+    """(..., TERMS) of places ``u`` (..., 3)."""
+    x, y, z = u[..., 0], u[..., 1], u[..., 2]
+    return np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, x * z, y * z], axis=-1)
+
+
+def crossed(a: Array, b: Array) -> Array:
+    """(N, 3, TERMS) cross product of vectors (N, 3, 4) that are linear in a place: constant, then slopes."""
+
+    def cross(i: int, j: int) -> Array:
+        return np.asarray(np.cross(a[..., i], b[..., j]))
+
+    own = [cross(i, i) for i in range(1, 4)]
+    slopes = [cross(0, i) + cross(i, 0) for i in range(1, 4)]
+    pairs = [cross(i, j) + cross(j, i) for i, j in combinations(range(1, 4), 2)]
+    return np.stack([cross(0, 0), *slopes, *own, *pairs], axis=-1)
+
+
+def lines(nodes: int, middle: Array, spread: float) -> Array:
+    """(nodes, 3, 4) the place itself: ``middle`` and ``spread`` times u."""
+    return np.broadcast_to(np.column_stack([middle, spread * np.eye(3)]), (nodes, 3, 4))
+
+
+def placed_wrench(force: Array, at: Array) -> Array:
+    """(N, 6, TERMS) wrench about the datum of a ``force`` (N, 3, 4) at the place ``at`` (N, 3, 4)."""
+    out = np.zeros((force.shape[0], 6, TERMS))
+    out[:, :3, :4] = force
+    out[:, 3:] = crossed(at, force)
+    return out
+
+
+def design() -> Array:
+    """(TERMS, 3) places from which all coefficients of the monomials follow."""
+    unit = np.eye(3)
+    pairs = [unit[i] + unit[j] for i, j in combinations(range(3), 2)]
+    return np.array([np.zeros(3), *unit, *(-unit), *pairs])
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best place of some amounts."""
+
+    gain: float  # nats
+    place: Array  # (3,) as given to ``monomials``
+    amounts: Array  # (a,)
+
+    @property
+    def weights(self) -> Array:
+        """(a * TERMS,) of the columns."""
+        return np.outer(self.amounts, monomials(self.place)).ravel()
+
+
+def best_place(
+    matrix: Array, right: Array, prior: Array, positive: int, spread: float, reach: float
+) -> Best | None:
+    """The place that explains most; None where nothing positive does.
+
+    matrix (a, TERMS, a, TERMS), right (a, TERMS): information and gradient of the columns with everything
+    else eliminated. prior (a,): precisions of the amounts; the first ``positive`` cannot be negative.
+    spread: std of a place about the middle. reach: places lie within so much of it along each axis.
+    """
+    line = np.linspace(-reach, reach, COARSE)
+    center, step = np.zeros(3), line[1] - line[0]
+    best: Best | None = None
+    for _ in range(1 + ROUNDS):
+        grid = center + np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)
+        grid = np.clip(grid, -reach, reach)
+        found = _best_of(grid, matrix, right, prior, positive, spread)
+        if found is None:
+            return best
+        best = found if best is None or found.gain > best.gain else best
+        center, line = best.place, np.linspace(-step, step, FINE)
+        step = line[1] - line[0]
+    return best
+
+
+def _best_of(
+    grid: Array, matrix: Array, right: Array, prior: Array, positive: int, spread: float
+) -> Best | None:
+    count = right.shape[0]
+    terms = monomials(grid)
+    M = np.einsum("pi,aibj,pj->pab", terms, matrix, terms, optimize=True) + np.diag(prior)
+    r = terms @ right.T
+    gains, amounts = np.full(grid.shape[0], -np.inf), np.zeros(r.shape)
+    rest = list(range(positive, count))
+    for kept in range(1, positive + 1):
+        for some in combinations(range(positive), kept):
+            chosen = [*some, *rest]
+            x = np.linalg.solve(M[:, chosen][:, :, chosen], r[:, chosen, None])[..., 0]
+            gain = 0.5 * np.sum(x * r[:, chosen], axis=1)
+            better = np.all(x[:, :kept] > 0.0, axis=1) & (gain > gains)
+            gains[better] = gain[better]
+            amounts[better] = 0.0
+            amounts[np.ix_(better, chosen)] = x[better]
+    gains -= 0.5 * np.sum(grid**2, axis=1) / spread**2
+    at = int(np.argmax(gains))
+    return None if not np.isfinite(gains[at]) else Best(float(gains[at]), grid[at], amounts[at])
