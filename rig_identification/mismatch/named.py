@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem, excess
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import (
     AT_NOISE,
     CHIEF,
     MOST_EFFECTS,
     Trials,
     catalogue,
+    count_of,
+    needed_gain,
     trials,
 )
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
+from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
 
 Notify = Callable[[str, float], None]
@@ -66,30 +71,39 @@ def named(ideal: Ideal, search: Search, notify: Notify, beside_push: Beside) -> 
             continue
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = whole_runs(ideal, search)
-        if best.mismatch.verdict == "explained" and not best.trace:
+        if _wholly(best):
             return pruned(best, search, len(candidates))
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best
         if near_noise(best.fitted):
-            again = _second_choice(ideal, before, tried, notify)
-            if again is not None:
-                return pruned(again[0], again[1], len(candidates))
-        if near_noise(best.fitted):
-            search.here, search.evaluation = best.fitted.problem, best.fitted.evaluation
+            others = list(_second_choices(ideal, before, tried, notify))
+            if others and _wholly(others[-1][0]):
+                return pruned(*others[-1], len(candidates))
+            standing = [(best, search), *others]
+            for found, its in standing:
+                its.here, its.evaluation = found.fitted.problem, found.fitted.evaluation
+            if others and step + 1 < MOST_EFFECTS and not search.budget.spent:
+                notify("search: which of them one more would explain", at)
+                best, search = _most_promising(standing, candidates)
         elif misfit(best.fitted.evaluation) > WRONG and first.candidate.build is not None:
             # Short pieces bend to anything that swings; what whole runs refute is no base to go on from
             break
     return fallback or best
 
 
-def _second_choice(
+def _wholly(found: Explained) -> bool:
+    """Whether every residual is noise."""
+    return found.mismatch.verdict == "explained" and not found.trace
+
+
+def _second_choices(
     ideal: Ideal, before: Search, tried: Trials, notify: Notify
-) -> tuple[Explained, Search] | None:
-    """A less likely hypothesis that explains all runs where the likeliest does not, and how it was found.
+) -> Iterator[tuple[Explained, Search]]:
+    """Less likely hypotheses near the noise in all runs, and how they were found.
 
     What has more numbers may bend further to the fitted runs. Held-out runs and the scale, which
-    tell what is bent, are heard by the verdict alone.
+    tell what is bent, are heard by the verdict alone. One that explains all is the last.
     """
     for other in (*tried.done[1:], *tried.beaten):
         search = replace(before, found=list(before.found), rivals=list(before.rivals))
@@ -98,6 +112,31 @@ def _second_choice(
             continue
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), 0.9)
         found = whole_runs(ideal, search)
-        if found.mismatch.verdict == "explained" and not found.trace:
-            return found, search
-    return None
+        if near_noise(found.fitted):
+            yield found, search
+        if _wholly(found):
+            return
+
+
+def _most_promising(
+    standing: list[tuple[Explained, Search]], candidates: list[Candidate]
+) -> tuple[Explained, Search]:
+    """Of hypotheses of which none explains all, the one that would with one more, to first order.
+
+    Short pieces hardly tell a cable's length from its hinge; with what else is wrong in the model
+    whole runs do.
+    """
+    count = count_of(candidates)
+    best: tuple[float, Explained, Search] | None = None
+    for found, search in standing:
+        have = {t.candidate.label for t in search.found}
+        others = [c for c in candidates if c.label not in have]
+        mass = mass_of(search.here, search.evaluation)
+        search.screened = screen(search.here, search.evaluation, others, mass)
+        gains = [p.gain - needed_gain(p.candidate, count) for p in search.screened]
+        after = search.evaluation.cost - max(0.0, *gains)
+        if best is None or after < best[0]:
+            best = after, found, search
+    if best is None:
+        raise ValueError("nothing to choose from")
+    return best[1:]

@@ -66,6 +66,7 @@ class Best:
     """The best place of some amounts."""
 
     gain: float  # nats
+    positive: float  # nats of it that what cannot be negative adds, there, to what has either sign
     place: Array  # (3,) as given to ``monomials``
     amounts: Array  # (a,)
 
@@ -108,6 +109,8 @@ def _best_of(
     r = terms @ right.T
     gains, amounts = np.full(grid.shape[0], -np.inf), np.zeros(r.shape)
     rest = list(range(positive, count))
+    x = np.linalg.solve(M[:, rest][:, :, rest], r[:, rest, None])[..., 0]
+    without = 0.5 * np.sum(x * r[:, rest], axis=1)
     for kept in range(1, positive + 1):
         for some in combinations(range(positive), kept):
             chosen = [*some, *rest]
@@ -117,6 +120,9 @@ def _best_of(
             gains[better] = gain[better]
             amounts[better] = 0.0
             amounts[np.ix_(better, chosen)] = x[better]
+    added = gains - without
     gains -= 0.5 * np.sum(grid**2, axis=1) / spread**2
     at = int(np.argmax(gains))
-    return None if not np.isfinite(gains[at]) else Best(float(gains[at]), grid[at], amounts[at])
+    if not np.isfinite(gains[at]):
+        return None
+    return Best(float(gains[at]), float(added[at]), grid[at], amounts[at])

@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 SHORT_HOSE = 1.0
 #: Places lie within so much of the rig's longest side about the middle.
 REACH = 0.6
+#: Gain (nats) of a tether's stiffness beyond its pull: what pulls steadily alone is no tether.
+STIFF = 3.0
 
 
 def tethers(rig: Rig, mass: float) -> list[Candidate]:
@@ -142,7 +144,9 @@ def placed_tethers(
             1.0,
             REACH,
         )
-        if best is not None:
+        if best is None or best.positive < STIFF:
+            out.append((candidate, 0.0, {}))
+        else:
             out.append((candidate, best.gain, _values(own, [q for _, q in points], best)))
     return out
 
