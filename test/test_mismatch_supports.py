@@ -14,13 +14,13 @@ from rig_identification.estimate.identify import fit_session, judged, pose_probl
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import weighed_otherwise
-from rig_identification.mismatch.amounts import SPACED, Amount, _ringing_ceiling
+from rig_identification.mismatch.amounts import SPACED, Amount, ringing_like
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.riders import Swing, rider_candidate
-from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.screen import Promise, carried, extended, with_reference
 from rig_identification.mismatch.search import begun, catalogue
 from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
-from rig_identification.mismatch.trial import attempt, mass_of
+from rig_identification.mismatch.trial import Trial, attempt, mass_of, promised
 from rig_identification.recording import Series, Session
 from rig_identification.simulate import simulate_session
 
@@ -89,19 +89,26 @@ def test_a_promise_too_far_off_is_walked_to(inextensible: tuple[Problem, Evaluat
     assert trial.evaluation.cost < evaluation.cost
 
 
-def test_a_ceiling_is_begun_as_fast_as_what_promises_most(
+def test_a_ceiling_is_begun_as_fast_as_the_part_on_springs_that_stands_in_for_it(
     inextensible: tuple[Problem, Evaluation],
 ) -> None:
     problem, evaluation = inextensible
     mass = mass_of(problem, evaluation)
-    swing = Swing("y", 6.5)
-    springs, values = rider_candidate(problem, swing, mass, 10.0, np.zeros(3))
-    (promise,) = _ringing_ceiling(problem, [Promise(springs, 100.0, values, 0.5)], mass)
+    springs, values = rider_candidate(problem, Swing("y", 6.5), mass, 10.0, np.zeros(3))
+    wide = extended(problem, (springs,))
+    begun_there = carried(wide, problem, evaluation.point)
+    at = evaluate(wide, promised(wide, begun_there, springs, values, evaluation))
+    assert at is not None
+    much = replace(evaluation, runs=tuple(replace(r, residual=10.0 * r.residual) for r in at.runs))
+    trial = Trial(springs, wide, at, 0.0)
+    (promise,) = ringing_like(problem, [trial], much, mass)
     assert promise.candidate.where == {"channel": "ceiling", "axis": "y"}
     nominal = {p.name: p.nominal for p in promise.candidate.parameters}
-    assert nominal["ceiling.frequency.y"] == 6.5
+    assert nominal["ceiling.frequency.y"] == pytest.approx(6.5)
     assert promise.values["ceiling.compliance.y"] > 0.0
-    assert _ringing_ceiling(problem, [], mass) == []
+    # What leaves as much as there was stands in for nothing
+    assert ringing_like(problem, [trial], at, mass) == []
+    assert ringing_like(problem, [], much, mass) == []
 
 
 def test_the_usual_stiffness_is_within_what_wire_and_rope_have() -> None:

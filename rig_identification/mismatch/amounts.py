@@ -25,7 +25,7 @@ from rig_identification.mismatch.supports import (
     largest_compliance,
     usual_stiffness,
 )
-from rig_identification.mismatch.trial import HORIZONS, promised
+from rig_identification.mismatch.trial import HORIZONS, Trial, promised
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,8 @@ STRETCHES = (0.1, 10.0)
 #: What takes energy out, and the parts of its prior's std that are tried.
 BRAKES = ("hinge_damping", "hinge_friction", "air_drag")
 BRAKED = (0.1, 10.0)
+#: Share of what was left below which what takes it away takes the larger part.
+LARGER = 0.5
 #: Factor between two amounts, and where little is left.
 SPACED, FINELY = 3.2, 1.4
 
@@ -151,22 +153,36 @@ def _spread(ends: tuple[float, float], spaced: float) -> Array:
     return np.asarray(np.geomspace(*ends, count))
 
 
-def _ringing_ceiling(problem: Problem, promises: list[Promise], mass: float) -> list[Promise]:
-    """A ceiling that rings as fast as the part on springs that promises most, and along the same axis.
+def ringing_ceiling(problem: Problem, frequency: float, axis: int, mass: float, gain: float) -> Promise:
+    """A ceiling that rings at ``frequency`` (Hz) along ``axis``, as a part on springs would.
 
     A ceiling that is light rings together with the body, slower than by itself; scanned at its usual
     frequency it is out of step at any amount. With next to no compliance it rings at its own frequency:
-    from there a fit follows both.
+    from there a fit follows both. gain: nats that the part on springs promises, or wins.
     """
-    springs = next((p for p in promises if p.candidate.effect == "sprung_mass"), None)
-    if springs is None:
-        return []
     rig, model = problem.bench.rig, problem.bench.parameters.model
-    axis = AXES.index(str(springs.candidate.where["axis"]))
-    frequency = next(p.nominal for p in springs.candidate.parameters if p.name == "sprung_mass.frequency")
     ceiling = ceiling_candidate(rig, model, mass, axis, frequency=frequency)
     compliance = SINKS[0] * largest_compliance(rig, mass)
-    return [Promise(ceiling, springs.gain, {f"ceiling.compliance.{AXES[axis]}": compliance})]
+    return Promise(ceiling, gain, {f"ceiling.compliance.{AXES[axis]}": compliance})
+
+
+def ringing_like(problem: Problem, tried: list[Trial], before: Evaluation, mass: float) -> list[Promise]:
+    """Ceilings that ring as that fitted part on springs does which takes the larger part of what is left."""
+    riders = [t for t in tried if t.candidate.effect in ("sprung_mass", "liquid_slosh")]
+    best = min(riders, key=lambda t: excess(t.evaluation), default=None)
+    if best is None or excess(best.evaluation) > LARGER * excess(before):
+        return []
+    parameters = best.problem.bench.parameters
+    values = dict(
+        zip((p.name for p in parameters.free), parameters.values(best.evaluation.point.theta), strict=True)
+    )
+    frequency = float(values[f"{best.candidate.effect}.frequency"])
+    axis = best.candidate.where["axis"]
+    gain = before.cost - best.evaluation.cost
+    return [
+        ringing_ceiling(problem, frequency, AXES.index(a), mass, gain)
+        for a in ("xy" if axis is None else str(axis))
+    ]
 
 
 def far_promises(
@@ -179,7 +195,11 @@ def far_promises(
     out += brakes(problem, evaluation, promises)
     riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
     out += riders[:1]
-    out += _ringing_ceiling(problem, promises, mass)
+    springs = next((p for p in promises if p.candidate.effect == "sprung_mass"), None)
+    if springs is not None:
+        frequency = next(p.nominal for p in springs.candidate.parameters if p.name == "sprung_mass.frequency")
+        axis = AXES.index(str(springs.candidate.where["axis"]))
+        out.append(ringing_ceiling(problem, frequency, axis, mass, springs.gain))
     out += [p for p in promises if p.candidate.effect == "loose_mass"][:1]
     if riders and riders[0].candidate.effect == "sprung_mass":
         # What swings along one axis may swing to all sides

@@ -106,6 +106,8 @@ def _second_choices(
     tell what is bent, are heard by the verdict alone. One that explains all is the last.
     """
     for other in (*tried.done[1:], *tried.beaten):
+        if misfit(other.evaluation) > AT_NOISE:
+            continue
         search = replace(before, found=list(before.found), rivals=list(before.rivals))
         search.adopt(tried, other)
         if misfit(search.evaluation) > AT_NOISE:

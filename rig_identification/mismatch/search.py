@@ -18,7 +18,7 @@ from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
-from rig_identification.mismatch.amounts import WORTH, far_promises, supports
+from rig_identification.mismatch.amounts import WORTH, far_promises, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned
@@ -197,6 +197,8 @@ def trials(
             known |= {p.candidate.label for p in worthy}
             worthy += [p for p in worth_a_fit(promises, count) if p.candidate.label not in known]
             tried += begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify, budget)
+        if not any(_at_noise(t) for t in tried) and not gives_way(problem.bench.parameters.model):
+            tried += begun(here, seen, ringing_like(here, tried, seen, mass), True, notify, budget)
     if not far and not _without_support(tried, seen):
         # Of what rings first order says nothing
         notify("what gives way")
