@@ -132,7 +132,7 @@ def placed_tethers(
     matrix = sum(c.T @ c for c in (*runs, *rests)) - found.seen.T @ found.solved
     matrix = matrix.reshape(len(names), TERMS, len(names), TERMS)
     right = found.right.reshape(len(names), TERMS)
-    out: list[Array] = []
+    out = []
     for candidate in chosen:
         own = [q for q in candidate.parameters if not q.name.startswith("tether.point.")]
         mixed = _mixing(own, [free[name][1] for name in names])
@@ -161,7 +161,7 @@ def _wrenches(problem: Problem, motion: Motion, middle: Array, spread: float, st
     moved = (R - model.physics[turn : turn + 9].reshape(3, 3)) @ at
     moved[..., 0] += motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
     moved[..., 0] -= model.physics[first : first + 3]
-    out = []
+    out: list[Array] = []
     for axis in range(3):
         along = R[:, axis, :, None]
         out.append(stds[axis] * placed_wrench(-along * moved[:, axis, None, :], at))
