@@ -132,7 +132,7 @@ def placed_tethers(
     matrix = sum(c.T @ c for c in (*runs, *rests)) - found.seen.T @ found.solved
     matrix = matrix.reshape(len(names), TERMS, len(names), TERMS)
     right = found.right.reshape(len(names), TERMS)
-    out = []
+    out: list[tuple[Candidate, float, dict[str, float]]] = []
     for candidate in chosen:
         own = [q for q in candidate.parameters if not q.name.startswith("tether.point.")]
         mixed = _mixing(own, [free[name][1] for name in names])
