@@ -32,3 +32,4 @@ class Fitted:
     notes: tuple[str, ...] = ()
     guess: Point | None = None  # where the fit started: everything about the rig as described
     held_parts: tuple[HeldPart, ...] = ()
+    lost: tuple[Run, ...] = ()  # held-out runs that cannot be followed from any start state

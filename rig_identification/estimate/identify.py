@@ -227,7 +227,7 @@ def without_unseen_force(session: Session, fitted: Fitted, chosen: Callable[[Run
     """
     if session.rig.exciter is None:
         return None
-    runs = (*fitted.problem.runs, *fitted.holdout_runs)
+    runs = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
     seen = (*fitted.evaluation.runs, *fitted.holdouts)
     pairs = [(run, lin) for run, lin in zip(runs, seen, strict=True) if run.force is None and chosen(run)]
     if not any(np.mean(linearised.residual**2) > HOPELESS_SQUARE for _, linearised in pairs):
@@ -258,7 +258,7 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         notify=lambda fraction, text: progress(f"fit: {text}", 0.15 + 0.45 * fraction),
     )
     progress("predicting held-out runs", 0.6)
-    held_runs, held_out = predicted(start.problem, start.held, evaluation.point.theta, start.rest)
+    held_runs, held_out, lost = predicted(start.problem, start.held, evaluation.point.theta, start.rest)
     return Fitted(
         start.problem,
         evaluation,
@@ -269,6 +269,7 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         start.notes,
         start.point,
         start.held_parts,
+        lost,
     )
 
 

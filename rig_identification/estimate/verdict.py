@@ -209,6 +209,10 @@ def judge(
             f"{d.recording}, held out, asks for other parameters than the fitted ones: squared deviations "
             f"come to {d.statistic:.3g} where {d.directions} are to be expected"
         )
+    reasons += [
+        f"{run.recording.name}, held out, cannot be followed with these parameters from any start"
+        for run in fitted.lost
+    ]
     reasons += _restless(fitted, heard.tests + len(fitted.problem.rests))
     if not fitted.converged:
         reasons.append("the fit did not settle")

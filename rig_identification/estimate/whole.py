@@ -31,7 +31,8 @@ def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fi
     begin = Point(point.theta, starts, point.rest_guesses)
     bends = whole.bench.parameters.model.internal > 0
     evaluation, converged = solve(whole, begin, iterations=20, polish=POLISH, bends=bends)
-    held_runs, held = predicted(whole, ideal.holdout_runs, evaluation.point.theta, rest)
+    known = (*ideal.holdout_runs, *ideal.lost)
+    held_runs, held, lost = predicted(whole, known, evaluation.point.theta, rest)
     return replace(
         ideal,
         problem=whole,
@@ -39,17 +40,24 @@ def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fi
         converged=converged,
         holdout_runs=held_runs,
         holdouts=held,
+        lost=lost,
     )
 
 
 def predicted(
     problem: Problem, held: tuple[Run, ...], theta: NDArray[np.float64], rest: State
-) -> tuple[tuple[Run, ...], tuple[Linearised, ...]]:
-    """Held-out runs that can be followed from a start state of their own, and how they come out."""
-    outcomes = []
+) -> tuple[tuple[Run, ...], tuple[Linearised, ...], tuple[Run, ...]]:
+    """Held-out runs that can be followed from a start state of their own, how they come out; the others."""
+    outcomes, lost = [], []
     for run in held:
         state = launch_state(problem.bench, run, theta, rest)
         result = fit_start_growing(problem.bench, run, theta, state)
-        if result is not None:
+        if result is None:
+            lost.append(run)
+        else:
             outcomes.append((run, result[0]))
-    return tuple(run for run, _ in outcomes), tuple(linearised for _, linearised in outcomes)
+    return (
+        tuple(run for run, _ in outcomes),
+        tuple(linearised for _, linearised in outcomes),
+        tuple(lost),
+    )

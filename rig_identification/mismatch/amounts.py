@@ -35,7 +35,7 @@ WORTH = 0.05
 #: Parts of the largest compliance of a ceiling that are tried.
 SINKS = (0.03, 0.7)
 #: Multiples of the usual stiffness of cables that are tried: thin wire to thick rope.
-STRETCHES = (0.1, 10.0)
+STRETCHES = (0.1, 18.0)
 #: What takes energy out, and the parts of its prior's std that are tried.
 BRAKES = ("hinge_damping", "hinge_friction", "air_drag")
 BRAKED = (0.1, 10.0)

@@ -46,7 +46,7 @@ def hand_finding(fitted: Fitted) -> Finding | None:
     length = float(np.mean([c.length for c in rig.cables]))
     peak, calm = 0.0, []
     recordings: dict[str, Recording] = {
-        r.recording.name: r.recording for r in (*fitted.problem.runs, *fitted.holdout_runs)
+        r.recording.name: r.recording for r in (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
     }
     for name, recording in recordings.items():
         found = _pull(prepare(rig, recording), rig.gravity, length)

@@ -85,7 +85,7 @@ def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
     """The ideal model fitted to all but the pieces that an event disturbs."""
     fitted = ideal.fitted
     runs = _all_without(fitted.problem.runs, event, event.start, event.end)
-    return fit_again(ideal, runs, fitted.holdout_runs, notify)
+    return fit_again(ideal, runs, (*fitted.holdout_runs, *fitted.lost), notify)
 
 
 def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Explained | None:

@@ -140,7 +140,7 @@ def slack_finding(spells: list[Spell]) -> Finding:
 def spells_of(fitted: Fitted) -> list[Spell]:
     """Slack spells of all runs of a session."""
     zeros = [p.prior_std for p in fitted.problem.bench.parameters.free if p.name.endswith("load_cell_zero")]
-    runs = (*fitted.problem.runs, *fitted.holdout_runs)
+    runs = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
     return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
 
 
@@ -168,10 +168,10 @@ def slack_alone(ideal: Ideal, spells: list[Spell]) -> Explained:
 def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | None:
     """The ideal model fitted between the spells, from where nothing is bent; None where nothing is left."""
     fitted = ideal.fitted
-    every = (*fitted.problem.runs, *fitted.holdout_runs)
+    every = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
     loose = [*spells, *blows(every, spells)]
     runs = tuple(part for run in fitted.problem.runs for part in taut_stretches(run, loose))
-    held = tuple(part for run in fitted.holdout_runs for part in taut_stretches(run, loose))
+    held = tuple(part for run in (*fitted.holdout_runs, *fitted.lost) for part in taut_stretches(run, loose))
     if not runs:
         return None
     return fit_again(ideal, runs, held, notify)

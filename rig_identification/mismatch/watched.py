@@ -181,13 +181,16 @@ def _whole(ideal: Fitted, found: list[Trial], weights: Problem, evaluation: Eval
     scored = evaluate(wide, fitted.point)
     if scored is None:
         raise FloatingPointError("the fitted motion cannot be followed")
-    held_runs, held = predicted(wide, ideal.holdout_runs, fitted.point.theta, ideal.rest)
+    held_runs, held, lost = predicted(
+        wide, (*ideal.holdout_runs, *ideal.lost), fitted.point.theta, ideal.rest
+    )
     return replace(
         ideal,
         problem=wide,
         evaluation=scored,
         converged=converged,
         holdout_runs=held_runs,
+        lost=lost,
         holdouts=held,
     )
 
@@ -240,7 +243,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
 
 def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:
     """(device, quantity, axis) -> residual as a share of the signal, held out where a run is."""
-    held = {run.recording.name for run in fitted.holdout_runs}
+    held = {run.recording.name for run in (*fitted.holdout_runs, *fitted.lost)}
     out: dict[tuple[str, str, int], float] = {}
     for c in found.channels:
         if c.recording in held or not held:
