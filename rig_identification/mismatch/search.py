@@ -36,8 +36,9 @@ Notify = Callable[[str], None]
 
 #: Hypotheses that get their first steps after each screening, and that get to their end.
 FITTED, FINISHED = 4, 3
-#: Of these, at most so many of one effect: its other places are its rivals anyway.
-ALIKE = 3
+#: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
+#: parameters of its own as a hose or a rider has, whose fits are slow and whose place is found already.
+ALIKE, ALIKE_IF_MANY, MANY = 3, 2, 6
 #: Effects looked for at most.
 MOST_EFFECTS = 2
 #: Share of what is left that a promise has to take for its fit to come before any other doubt.
@@ -272,7 +273,8 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
     out: list[Promise] = []
     for p in worthy:
         alike = sum(q.candidate.effect == p.candidate.effect for q in out)
-        if p.gain > WORTH * worthy[0].gain and alike < ALIKE and len(out) < FITTED:
+        most = ALIKE if len(p.candidate.parameters) < MANY else ALIKE_IF_MANY
+        if p.gain > WORTH * worthy[0].gain and alike < most and len(out) < FITTED:
             out.append(p)
     return out
 
