@@ -149,3 +149,9 @@ def test_what_the_scale_contradicts_is_said(fitted: Fitted) -> None:
     heavier = replace(fitted, problem=replace(fitted.problem, mass=(mass + 30.0, 0.5)))
     assert "the scale says" in (weighed_otherwise(heavier) or "")
     assert judged(heavier)[1].verdict == "unexplained"
+
+
+def test_a_held_out_run_that_cannot_be_followed_refutes(fitted: Fitted) -> None:
+    mismatch = judged(replace(fitted, lost=(fitted.problem.runs[0],)))[1]
+    assert mismatch.verdict == "unexplained"
+    assert "run_1, held out, cannot be followed" in mismatch.explanation.lower()

@@ -54,7 +54,7 @@ def _hidden(ideal: Ideal, notify: Notify) -> Explained | None:
     if not worth_a_fit(promises, count_of(candidates)):
         return None
     search = Search(problem, problem, fitted.evaluation, excess(fitted.evaluation), screened=promises)
-    best = named(ideal, search, notify, partial(_beside_push, ideal, notify=notify))
+    best = named(ideal, search, notify)
     return best if best is not None and best.mismatch.verdict == "explained" and not best.trace else None
 
 

@@ -30,7 +30,9 @@ Notify = Callable[[str, float], None]
 Beside = Callable[[Problem, Evaluation], Explained | None]
 
 
-def named(ideal: Ideal, search: Search, notify: Notify, beside_push: Beside) -> Explained | None:
+def named(
+    ideal: Ideal, search: Search, notify: Notify, beside_push: Beside | None = None
+) -> Explained | None:
     """Effects of the catalogue, one after the other, until the whole runs are explained."""
     candidates = catalogue(search.problem)
     best: Explained | None = None
@@ -61,7 +63,9 @@ def named(ideal: Ideal, search: Search, notify: Notify, beside_push: Beside) -> 
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         if misfit(search.evaluation) > EXPLAINED:
             # A push among pieces that all lack something stands out with that in the model
-            beside = None if search.whole else beside_push(search.here, search.evaluation)
+            beside = None
+            if beside_push is not None and not search.whole:
+                beside = beside_push(search.here, search.evaluation)
             if beside is not None:
                 return beside
             if search.share < CHIEF:

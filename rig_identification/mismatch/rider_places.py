@@ -7,7 +7,7 @@ a tank at the end of a vehicle feels another acceleration than one in its middle
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,36 +29,42 @@ Array = NDArray[np.float64]
 COARSE = tuple(float(f) for f in np.geomspace(0.9, 1.11, 9))
 FINE = tuple(float(f) for f in np.geomspace(0.985, 1.015, 5))
 DAMPINGS = (0.006, 0.03, 0.12)
-#: Places lie within so much of the rig's longest side about the middle.
-REACH = 0.6
+#: Places lie within so much of ``spread_of`` about the middle.
+REACH = 1.2
 
 
-def finer(
-    problem: Problem, beyond: Beyond, swing: Swing, mass: float
-) -> tuple[Swing, float, Best, Columns, list[Array]] | None:
-    """The best frequency, damping and place near those of ``swing``: with what it is made of.
+@dataclass(frozen=True)
+class Ridden:
+    """A rider where it explains most."""
 
-    mass: kg, of the body. Returns the swing, its damping ratio, the best place (in units of ``spread_of``)
-    and its columns and those of every run; None where no mass at all promises anything.
+    swing: Swing
+    damping: float  # ratio
+    best: Best  # kg, at a place in units of ``spread_of`` from the middle
+    columns: Columns
+    runs: list[Array]  # (m, TERMS) its columns in every run
+
+
+def finer(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden | None:
+    """The best frequency, damping and place near those of ``swing``; None where no mass promises anything.
+
+    mass: kg, of the body.
     """
-    best = None
+    best: Ridden | None = None
     for factors in (COARSE, FINE):
-        center = swing if best is None else best[0]
+        center = swing if best is None else best.swing
         for factor in factors:
             tried = replace(center, frequency=center.frequency * factor)
             found = _best_damping(problem, beyond, tried, mass)
-            if found is not None and (best is None or found[2].gain > best[2].gain):
+            if found is not None and (best is None or found.best.gain > best.best.gain):
                 best = found
     return best
 
 
-def _best_damping(
-    problem: Problem, beyond: Beyond, swing: Swing, mass: float
-) -> tuple[Swing, float, Best, Columns, list[Array]] | None:
+def _best_damping(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden | None:
     wrenches = _wrenches(problem, beyond.full, swing)
     responses = [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(beyond.full.runs)]
     found = beyond.of(responses)
-    best = None
+    best: Ridden | None = None
     for k, damping in enumerate(DAMPINGS):
         chosen = slice(TERMS * k, TERMS * (k + 1))
         columns = Columns(found.seen[:, chosen], found.solved[:, chosen], found.right[chosen])
@@ -70,10 +76,10 @@ def _best_damping(
             np.array([1.0 / (0.05 * mass) ** 2]),
             1,
             1.0,
-            REACH * 2.0,
+            REACH,
         )
-        if at is not None and (best is None or at.gain > best[2].gain):
-            best = swing, damping, at, columns, own
+        if at is not None and (best is None or at.gain > best.best.gain):
+            best = Ridden(swing, damping, at, columns, own)
     return best
 
 

@@ -248,14 +248,13 @@ def _finer(problem: Problem, beyond: Beyond, coarse: Promise, mass: float) -> li
     found = finer(problem, beyond, Swing("xy" if axis is None else str(axis), frequency), mass)
     if found is None:
         return []
-    swing, damping, best, columns, responses = found
-    gain = best.gain
+    best, gain = found.best, found.best.gain
     if misfit(beyond.full) < NEAR_SQUARE:
-        residuals = beyond.residuals(columns, best.weights, responses)
+        residuals = beyond.residuals(found.columns, best.weights, found.runs)
         gain -= unearned_of(problem, beyond.full, beyond.full.runs, residuals)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
-    candidate, values = rider_candidate(problem, swing, mass, float(best.amounts[0]), at)
-    return [Promise(candidate, gain, values | {f"{effect}.damping_ratio": damping})]
+    candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
+    return [Promise(candidate, gain, values | {f"{effect}.damping_ratio": found.damping})]
 
 
 def _unearned(

@@ -54,7 +54,7 @@ RIVAL = 10.0
 #: Share of what was left up to which a hypothesis, after its first steps, is fitted to its end at once.
 ALMOST = 0.05
 #: Hypotheses that are tried on top of another one, which leaves something.
-FURTHER = 2
+FURTHER = 4
 #: Share of what is left that counts as the larger part of it.
 CHIEF = 0.5
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
@@ -175,7 +175,7 @@ def trials(
         tried = begun(here, seen, _worth_it(promises, count, seen, far), far, notify, budget)
     device, needed = None, log_evidence(seen) + MEANT
     if far and more and not any(_at_noise(t) for t in tried):
-        lead = _leading(tried, seen, candidates, mass, notify)
+        lead = leading(tried, seen, candidates, mass, notify)
         if lead is not None:
             return Trials([lead])
     if far and not any(_at_noise(t) for t in tried):
@@ -233,7 +233,7 @@ def trials(
     return Trials(told_apart(done, MEANT), device, tuple(beaten))
 
 
-def _leading(
+def leading(
     tried: list[Trial], before: Evaluation, candidates: list[Candidate], mass: float, notify: Notify
 ) -> Trial | None:
     """The hypothesis with which, and with one more, nothing is left; None where there is none.

@@ -35,8 +35,8 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     # What says most comes first, whatever was found first
     found = sorted(found, key=lambda t: -strength(_at(fitted, t)))
     after, verdict = judged(fitted)
-    # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is a
-    # held-out run that cannot be followed, of which there is no residual to hear
+    # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
+    # a held-out run that cannot be followed, of which there is no residual to hear
     trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None and not fitted.lost
     heard = hear(fitted) if trace and only_a_trace(ideal.fitted, fitted) else None
     trace = heard is not None and not heard.contradicted
