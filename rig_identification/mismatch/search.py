@@ -242,8 +242,9 @@ def leading(
     is left with either of the two shows the other one plainly.
     """
     best: tuple[float, Trial] | None = None
+    least = min((excess(t.evaluation) for t in tried), default=0.0)
     for trial in sorted(tried, key=lambda t: (t.candidate.build is not None, excess(t.evaluation))):
-        if excess(trial.evaluation) > CHIEF * excess(before):
+        if excess(trial.evaluation) > min(CHIEF * excess(before), RIVAL * least):
             continue
         if best is not None and trial.candidate.build is not None:
             # What changes the model and is fitted slowly may bend to anything
@@ -262,6 +263,7 @@ def leading(
                 continue
             if best is None or second.evidence > best[0]:
                 best = second.evidence, first
+            break
     return None if best is None else best[1]
 
 
@@ -294,6 +296,11 @@ def _shows(evaluation: Evaluation) -> bool:
     return bool(excess(evaluation) >= SEEN * np.sqrt(0.5 * size))
 
 
+def _slow(candidate: Candidate) -> bool:
+    """Whether a fit takes ten times as long as that of a sensor's error."""
+    return candidate.build is not None or len(candidate.parameters) >= MANY
+
+
 def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
     """Whether a hypothesis is no rival of those that reached the noise, by its first steps."""
     if far:
@@ -313,7 +320,7 @@ def begun(
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
-    reached, kept, done, enough = 0.0, 0.0, False, False
+    reached, nearly, kept, done, enough = 0.0, 0.0, 0.0, False, False
     slow = gives_way(problem.bench.parameters.model)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
@@ -337,11 +344,15 @@ def begun(
         if far and promise.candidate.build is not None and (enough or promise.gain < CLOSE * reached):
             # Another one left nothing already, and much more was expected of it, or it was not the first
             continue
+        if far and promise.gain < CLOSE * nearly and _slow(promise.candidate):
+            # Another one left next to nothing, and much more was expected of it
+            continue
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise)
         if trial is not None and far and _almost(trial, evaluation):
             # Worth its last steps before any other is tried
             trial = finished(trial) or trial
+            nearly = max(nearly, promise.gain)
         if trial is not None:
             out.append(trial)
             kept = max(kept, min(promise.gain, evaluation.cost - trial.evaluation.cost))
