@@ -12,9 +12,9 @@ from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.places import TERMS, best_place, crossed, design, monomials
 from rig_identification.mismatch.screen import Promise, screen, with_reference
-from rig_identification.mismatch.search import catalogue
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.simulate import simulate_session
 

@@ -8,11 +8,11 @@ from functools import partial
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
 from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
 from rig_identification.mismatch.screen import screen, with_reference
-from rig_identification.mismatch.search import catalogue, count_of, worth_a_fit
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
 from rig_identification.mismatch.trial import mass_of

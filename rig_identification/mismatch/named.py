@@ -10,15 +10,13 @@ from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.hypotheses import catalogue, count_of, needed_gain
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import (
     AT_NOISE,
     CHIEF,
     MOST_EFFECTS,
     Trials,
-    catalogue,
-    count_of,
-    needed_gain,
     trials,
 )
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search

@@ -12,33 +12,24 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
-from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
-from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH, far_promises, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import told_apart
-from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.locate import devices_of, find_liar
-from rig_identification.mismatch.riders import SWINGS
-from rig_identification.mismatch.rig_errors import rig_errors
+from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.screen import Promise, screen
-from rig_identification.mismatch.sensor_errors import sensor_errors
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, log_evidence, mass_of
 
 Notify = Callable[[str], None]
 
-#: Hypotheses that get their first steps after each screening, and that get to their end.
-FITTED, FINISHED = 4, 3
-#: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
-#: parameters of its own as a hose or a rider has, whose fits are slow and whose place is found already.
-ALIKE, ALIKE_IF_MANY, MANY = 3, 2, 6
+#: Hypotheses that get to their end.
+FINISHED = 3
 #: Effects looked for at most.
 MOST_EFFECTS = 2
 #: Share of what is left that a promise has to take for its fit to come before any other doubt.
@@ -63,34 +54,6 @@ SEEN = 4.0
 #: promised and kept that its promise must come to.
 BEATEN = 30.0
 CLOSE = 0.7
-
-
-def catalogue(problem: Problem) -> list[Candidate]:
-    """Every hypothesis that this session's rig and channels admit."""
-    rig, parameters = problem.bench.rig, problem.bench.parameters
-    mass = float(
-        parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0]
-    )
-    return [
-        *sensor_errors(rig, parameters, devices_of(problem)),
-        *rig_errors(rig, parameters),
-        *left_out_physics(rig, parameters, mass),
-    ]
-
-
-def count_of(candidates: list[Candidate]) -> int:
-    """How many hypotheses are tried: riders swing in many ways."""
-    return len(candidates) + len(SWINGS)
-
-
-def needed_gain(candidate: Candidate, count: int) -> float:
-    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks).
-
-    Bonferroni's correction, weighted (Genovese, Roeder and Wasserman, Biometrika 93, 2006): what the lab
-    doubts itself is likelier wrong than what it leaves out.
-    """
-    weight = DOUBTED if candidate.doubted else 1.0
-    return 0.5 * float(chi2.isf(weight * FALSE_ALARM / count, len(candidate.parameters)))
 
 
 def worst_pieces(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
@@ -267,20 +230,6 @@ def leading(
     return None if best is None else best[1]
 
 
-def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
-    """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie."""
-    worthy = [p for p in promises if p.gain > needed_gain(p.candidate, count)]
-    if device is not None:
-        worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
-    out: list[Promise] = []
-    for p in worthy:
-        alike = sum(q.candidate.effect == p.candidate.effect for q in out)
-        most = ALIKE if len(p.candidate.parameters) < MANY else ALIKE_IF_MANY
-        if p.gain > WORTH * worthy[0].gain and alike < most and len(out) < FITTED:
-            out.append(p)
-    return out
-
-
 def _worth_it(promises: list[Promise], count: int, seen: Evaluation, far: bool) -> list[Promise]:
     """Promises worth a fit; where the residuals as a whole show something, only those that take of it away.
 
@@ -294,11 +243,6 @@ def _shows(evaluation: Evaluation) -> bool:
     """Whether the residuals as a whole show that something is left."""
     size = sum(run.residual.size for run in evaluation.runs)
     return bool(excess(evaluation) >= SEEN * np.sqrt(0.5 * size))
-
-
-def _slow(candidate: Candidate) -> bool:
-    """Whether a fit takes ten times as long as that of a sensor's error."""
-    return candidate.build is not None or len(candidate.parameters) >= MANY
 
 
 def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
@@ -321,7 +265,7 @@ def begun(
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
     out: list[Trial] = []
     reached, nearly, kept, done, enough = 0.0, 0.0, 0.0, False, False
-    slow = gives_way(problem.bench.parameters.model)
+    rings = gives_way(problem.bench.parameters.model)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
         most = max((p.gain for p in worthy), default=0.0)
@@ -330,7 +274,7 @@ def begun(
             key=lambda p: (p.candidate.build is not None or p.gain < CLOSE * most, -p.gain),
         )
     for promise in worthy:
-        if promise.candidate.build is not None and promise.share < CHIEF and slow:
+        if promise.candidate.build is not None and promise.share < CHIEF and rings:
             # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
             continue
         if budget.spent and (out or promise.candidate.build is not None):
@@ -344,7 +288,7 @@ def begun(
         if far and promise.candidate.build is not None and (enough or promise.gain < CLOSE * reached):
             # Another one left nothing already, and much more was expected of it, or it was not the first
             continue
-        if far and promise.gain < CLOSE * nearly and _slow(promise.candidate):
+        if far and promise.gain < CLOSE * nearly and slow(promise.candidate):
             # Another one left next to nothing, and much more was expected of it
             continue
         notify(promise.candidate.label)

@@ -26,9 +26,9 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.hands import hand_finding
+from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.search import needed_gain
 from rig_identification.mismatch.threads import physics_of_pendulums
 from rig_identification.mismatch.trial import Trial, finished, log_evidence, mass_of, signs
 from rig_identification.result import ELEMENTS, Mismatch

@@ -13,8 +13,8 @@ from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import finding
+from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
-from rig_identification.mismatch.search import needed_gain
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, beyond_doubt, strength
 from rig_identification.result import Finding, Mismatch

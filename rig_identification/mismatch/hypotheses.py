@@ -1,0 +1,71 @@
+"""Every hypothesis of a session, what each has to promise, and which promises are worth a fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2
+
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
+from rig_identification.mismatch.amounts import WORTH
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.left_out_physics import left_out_physics
+from rig_identification.mismatch.locate import devices_of
+from rig_identification.mismatch.riders import SWINGS
+from rig_identification.mismatch.rig_errors import rig_errors
+from rig_identification.mismatch.screen import Promise
+from rig_identification.mismatch.sensor_errors import sensor_errors
+
+#: Hypotheses that get their first steps after each screening.
+FITTED = 4
+#: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
+#: parameters of its own as a hose or a rider has, whose fits are slow and whose place is found already.
+ALIKE, ALIKE_IF_MANY, MANY = 3, 2, 6
+
+
+def catalogue(problem: Problem) -> list[Candidate]:
+    """Every hypothesis that this session's rig and channels admit."""
+    rig, parameters = problem.bench.rig, problem.bench.parameters
+    mass = float(
+        parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0]
+    )
+    return [
+        *sensor_errors(rig, parameters, devices_of(problem)),
+        *rig_errors(rig, parameters),
+        *left_out_physics(rig, parameters, mass),
+    ]
+
+
+def count_of(candidates: list[Candidate]) -> int:
+    """How many hypotheses are tried: riders swing in many ways."""
+    return len(candidates) + len(SWINGS)
+
+
+def needed_gain(candidate: Candidate, count: int) -> float:
+    """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks).
+
+    Bonferroni's correction, weighted (Genovese, Roeder and Wasserman, Biometrika 93, 2006): what the lab
+    doubts itself is likelier wrong than what it leaves out.
+    """
+    weight = DOUBTED if candidate.doubted else 1.0
+    return 0.5 * float(chi2.isf(weight * FALSE_ALARM / count, len(candidate.parameters)))
+
+
+def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
+    """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie."""
+    worthy = [p for p in promises if p.gain > needed_gain(p.candidate, count)]
+    if device is not None:
+        worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
+    out: list[Promise] = []
+    for p in worthy:
+        alike = sum(q.candidate.effect == p.candidate.effect for q in out)
+        most = ALIKE if len(p.candidate.parameters) < MANY else ALIKE_IF_MANY
+        if p.gain > WORTH * worthy[0].gain and alike < most and len(out) < FITTED:
+            out.append(p)
+    return out
+
+
+def slow(candidate: Candidate) -> bool:
+    """Whether a fit takes ten times as long as that of a sensor's error."""
+    return candidate.build is not None or len(candidate.parameters) >= MANY
