@@ -18,7 +18,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.amounts import WORTH, far_promises, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
+from rig_identification.mismatch.hypotheses import count_of, slow, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.locate import find_liar
