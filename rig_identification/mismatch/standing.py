@@ -39,9 +39,11 @@ class Search:
         return len(self.here.runs) == len(self.problem.runs)
 
     def adopt(self, tried: Trials, chosen: Trial) -> None:
-        """Go on with ``chosen`` in the model; the other likely ones are its rivals."""
+        """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals."""
         self.found.append(chosen)
-        self.rivals += [rival(t, chosen) for t in tried.done if t is not chosen]
+        self.rivals += [
+            rival(t, chosen) for t in tried.done if t is not chosen and t.evidence <= chosen.evidence
+        ]
         self.here, self.evaluation = adopted(self.here, self.evaluation, chosen)
 
 
