@@ -6,33 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_simulate_identify import shaken
+from test_simulate_identify import seen_by_the_true_body, shaken
 
-from rig_identification.estimate.growing import settled_starts
-from rig_identification.estimate.identify import pose_problem
-from rig_identification.estimate.launch import Launch
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.places import TERMS, best_place, crossed, design, monomials
-from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.trial import mass_of
-from rig_identification.simulate import simulate_session
 
 
 def told_by(
     effects: dict[str, tuple[float, ...]], *, noise: bool = True
 ) -> tuple[Problem, Evaluation, list[Promise]]:
     """What screening promises about the true body of a rig with ``effects``, its start states fitted."""
-    session, truth = simulate_session(
-        replace(shaken(14, 12.0), effects=effects, doubts=False, noise=noise), np.random.default_rng(3)
-    )
-    problem, theta, _ = pose_problem(session)
-    launch = Launch(problem, theta).from_rest().from_momentum()
-    assert launch.rest is not None
-    problem = with_reference(problem, launch.rest)
-    point = replace(launch.point(), theta=problem.bench.parameters.start(truth.elements))
-    found = evaluate(problem, replace(point, starts=settled_starts(problem, point)))
-    assert found is not None
+    spec = replace(shaken(14, 12.0), effects=effects, doubts=False, noise=noise)
+    problem, found = seen_by_the_true_body(spec, 3)
     return problem, found, screen(problem, found, catalogue(problem), mass_of(problem, found))
 
 

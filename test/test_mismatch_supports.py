@@ -6,19 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_simulate_identify import shaken
+from test_simulate_identify import seen_by_the_true_body, shaken
 
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.growing import misfit, settled_starts
-from rig_identification.estimate.identify import fit_session, judged, pose_problem
-from rig_identification.estimate.launch import Launch
+from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.identify import fit_session, judged
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import weighed_otherwise
 from rig_identification.mismatch.amounts import SPACED, Amount, ringing_like
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.riders import Swing, rider_candidate
-from rig_identification.mismatch.screen import Promise, carried, extended, with_reference
+from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.search import begun
 from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
 from rig_identification.mismatch.trial import Trial, attempt, mass_of, promised
@@ -33,15 +32,7 @@ STIFFNESS = 2e7
 def inextensible() -> tuple[Problem, Evaluation]:
     """A session on cables that stretch, seen by a model of cables that do not; all else as it is."""
     spec = replace(shaken(14, 4.0), effects={"cable_elasticity": (STIFFNESS,)}, doubts=False)
-    session, truth = simulate_session(spec, np.random.default_rng(5))
-    problem, theta, _ = pose_problem(session)
-    launch = Launch(problem, theta).from_rest().from_momentum()
-    assert launch.rest is not None
-    problem = with_reference(problem, launch.rest)
-    point = replace(launch.point(), theta=problem.bench.parameters.start(truth.elements))
-    found = evaluate(problem, replace(point, starts=settled_starts(problem, point)))
-    assert found is not None
-    return problem, found
+    return seen_by_the_true_body(spec, 5)
 
 
 @pytest.mark.parametrize("start", [0.25, 4.0])

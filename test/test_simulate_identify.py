@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig_identification.estimate.identify import fit_session
+from rig_identification.estimate.growing import settled_starts
+from rig_identification.estimate.identify import fit_session, pose_problem
+from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.observability import inertial_estimate
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.mismatch.screen import with_reference
 from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.simulate import (
     Pulled,
@@ -32,6 +36,19 @@ def shaken(number: int, seconds: float = 6.0) -> SessionSpec:
     pull = Pulled(0.06 * weight * np.array([0.6, 0.8, 0.0]), spec.elements[1:4] + np.array([0.3, 0.2, 0.0]))
     motor = UnbalancedMass(0.05 * weight / (2.0 * np.pi * 0.7) ** 2, 0.7, ramp=2.0)
     return replace(spec, runs=(RunSpec("run_1", seconds, pull, motor),))
+
+
+def seen_by_the_true_body(spec: SessionSpec, seed: int) -> tuple[Problem, Evaluation]:
+    """A session under the ideal model of the true body, its start states fitted and nothing else."""
+    session, truth = simulate_session(spec, np.random.default_rng(seed))
+    problem, theta, _ = pose_problem(session)
+    launch = Launch(problem, theta).from_rest().from_momentum()
+    assert launch.rest is not None
+    problem = with_reference(problem, launch.rest)
+    point = replace(launch.point(), theta=problem.bench.parameters.start(truth.elements))
+    found = evaluate(problem, replace(point, starts=settled_starts(problem, point)))
+    assert found is not None
+    return problem, found
 
 
 def identified(spec: SessionSpec, seed: int) -> tuple[InertialEstimate, Truth, bool]:

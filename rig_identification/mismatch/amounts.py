@@ -39,8 +39,8 @@ STRETCHES = (0.1, 18.0)
 #: What takes energy out, and the parts of its prior's std that are tried.
 BRAKES = ("hinge_damping", "hinge_friction", "air_drag")
 BRAKED = (0.1, 10.0)
-#: Share of what was left below which what takes it away takes the larger part.
-LARGER = 0.5
+#: Share of what is left that counts as the larger part of it.
+CHIEF = 0.5
 #: Factor between two amounts, and where little is left.
 SPACED, FINELY = 3.2, 1.4
 
@@ -170,7 +170,7 @@ def ringing_like(problem: Problem, tried: list[Trial], before: Evaluation, mass:
     """Ceilings that ring as that fitted part on springs does which takes the larger part of what is left."""
     riders = [t for t in tried if t.candidate.effect in ("sprung_mass", "liquid_slosh")]
     best = min(riders, key=lambda t: excess(t.evaluation), default=None)
-    if best is None or excess(best.evaluation) > LARGER * excess(before):
+    if best is None or excess(best.evaluation) > CHIEF * excess(before):
         return []
     parameters = best.problem.bench.parameters
     values = dict(

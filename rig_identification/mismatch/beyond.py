@@ -22,6 +22,14 @@ class Columns:
     solved: Array  # (b, c): what of them the base takes
     right: Array  # (c,): gradient that is left
 
+    def part(self, chosen: slice) -> Columns:
+        """Some of the columns."""
+        return Columns(self.seen[:, chosen], self.solved[:, chosen], self.right[chosen])
+
+    def information(self, rows: Sequence[Array]) -> Array:
+        """(c, c) information that is left of these columns, which are ``rows`` (m, c) wherever they show."""
+        return np.asarray(sum(own.T @ own for own in rows) - self.seen.T @ self.solved)
+
 
 class Beyond:
     """A linearised problem of which the unknowns ``base`` are free.

@@ -8,13 +8,13 @@ from dataclasses import replace
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem, excess
+from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, needed_gain
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import (
     AT_NOISE,
-    CHIEF,
     MOST_EFFECTS,
     Trials,
     trials,

@@ -67,11 +67,10 @@ def _best_damping(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -
     best: Ridden | None = None
     for k, damping in enumerate(DAMPINGS):
         chosen = slice(TERMS * k, TERMS * (k + 1))
-        columns = Columns(found.seen[:, chosen], found.solved[:, chosen], found.right[chosen])
+        columns = found.part(chosen)
         own = [r[:, chosen] for r in responses]
-        matrix = sum(c.T @ c for c in own) - columns.seen.T @ columns.solved
         at = best_place(
-            matrix.reshape(1, TERMS, 1, TERMS),
+            columns.information(own).reshape(1, TERMS, 1, TERMS),
             columns.right.reshape(1, TERMS),
             np.array([1.0 / (0.05 * mass) ** 2]),
             1,

@@ -214,9 +214,9 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     near = misfit(full) < NEAR_SQUARE
     for k, swing in enumerate(SWINGS):
         chosen = slice(WIDTH * k, WIDTH * (k + 1))
-        own = sum(r[:, chosen].T @ r[:, chosen] for r in responses)
-        matrix = about.T @ (own - found.seen[:, chosen].T @ found.solved[:, chosen]) @ about
-        right = about.T @ found.right[chosen]
+        columns, own = found.part(chosen), [r[:, chosen] for r in responses]
+        matrix = about.T @ columns.information(own) @ about
+        right = about.T @ columns.right
         alone = right[0] / (matrix[0, 0] + 1.0 / (0.05 * mass) ** 2)
         if alone <= 0.0:
             continue
@@ -225,7 +225,7 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
         gain = 0.5 * float(step @ right)
         kind = swing.effect, swing.directions
         if step[0] > 0.0 and near and (kind not in best or gain > best[kind].gain):
-            gain -= _unearned(problem, beyond, found, chosen, about @ step, responses)
+            gain -= _unearned(problem, beyond, columns, about @ step, own)
         if step[0] <= 0.0 or (kind in best and gain <= best[kind].gain):
             continue
         at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
@@ -250,19 +250,15 @@ def _finer(problem: Problem, beyond: Beyond, coarse: Promise, mass: float) -> li
         return []
     best, gain = found.best, found.best.gain
     if misfit(beyond.full) < NEAR_SQUARE:
-        residuals = beyond.residuals(found.columns, best.weights, found.runs)
-        gain -= unearned_of(problem, beyond.full, beyond.full.runs, residuals)
+        gain -= _unearned(problem, beyond, found.columns, best.weights, found.runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
     return [Promise(candidate, gain, values | {f"{effect}.damping_ratio": found.damping})]
 
 
-def _unearned(
-    problem: Problem, beyond: Beyond, found: Columns, chosen: slice, amounts: Array, responses: list[Array]
-) -> float:
+def _unearned(problem: Problem, beyond: Beyond, columns: Columns, amounts: Array, runs: list[Array]) -> float:
     """What of a gain near the noise no motion accounts for."""
-    part = Columns(found.seen[:, chosen], found.solved[:, chosen], found.right[chosen])
-    residuals = beyond.residuals(part, amounts, [r[:, chosen] for r in responses])
+    residuals = beyond.residuals(columns, amounts, runs)
     return unearned_of(problem, beyond.full, beyond.full.runs, residuals)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
-from rig_identification.mismatch.amounts import WORTH, far_promises, ringing_like, supports
+from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import count_of, slow, worth_a_fit
@@ -46,8 +46,6 @@ RIVAL = 10.0
 ALMOST = 0.05
 #: Hypotheses that are tried on top of another one, which leaves something.
 FURTHER = 4
-#: Share of what is left that counts as the larger part of it.
-CHIEF = 0.5
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
 SEEN = 4.0
 #: Near the noise: log evidence by which a hypothesis is beaten for good, and the share of what another one

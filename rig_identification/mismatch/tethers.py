@@ -129,8 +129,7 @@ def placed_tethers(
     if rests is None:
         return []
     found = beyond.of(runs, rests)
-    matrix = sum(c.T @ c for c in (*runs, *rests)) - found.seen.T @ found.solved
-    matrix = matrix.reshape(len(names), TERMS, len(names), TERMS)
+    matrix = found.information((*runs, *rests)).reshape(len(names), TERMS, len(names), TERMS)
     right = found.right.reshape(len(names), TERMS)
     out: list[tuple[Candidate, float, dict[str, float]]] = []
     for candidate in chosen:
