@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 from test_model_conservation import kinetic_and_potential
 from test_model_derivatives import (
     SUBSTEPS,
@@ -14,7 +18,7 @@ from test_model_derivatives import (
     richardson,
 )
 from test_model_gyroscopic import SPIN, falling, spinning
-from test_model_rigs import moving, random_sample, thesis_case_14
+from test_model_rigs import Sample, moving, random_sample, thesis_case_14
 
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -33,14 +37,14 @@ def having(model: RigModel, **amounts: float) -> RigModel:
     return model.with_physics(physics)
 
 
-def rolling(model: RigModel, start: State, stiffness: float) -> RigModel:
+def rolling(model: RigModel, start: State, stiffness: float, skew: float = 0.0) -> RigModel:
     """The model with hinges that are without strain at ``start``."""
     physics = model.physics.copy()
     block = place.effects_block(model.cables)
     physics[block + place.REFERENCE_POSITION :][:3] = start.position
     physics[block + place.REFERENCE_ROTATION :][:9] = start.R_world_body.ravel()
     physics[block + place.ROLL_AXIS :][:3] = AXIS
-    return having(model.with_physics(physics), ROLL_STIFFNESS=stiffness)
+    return having(model.with_physics(physics), ROLL_STIFFNESS=stiffness, ROLL_SKEW=skew)
 
 
 def cables_in_body(model: RigModel, position: np.ndarray, R: np.ndarray) -> np.ndarray:
@@ -54,21 +58,25 @@ def cables_in_body(model: RigModel, position: np.ndarray, R: np.ndarray) -> np.n
     return np.array(out)
 
 
-def strain_energy(model: RigModel, motion: Motion, start: State, stiffness: float) -> np.ndarray:
+def strain_energy(model: RigModel, motion: Motion, start: State, stiffness: float, skew: float) -> np.ndarray:
+    up = start.R_world_body.T @ [0.0, 0.0, 1.0]
+    axis = AXIS + skew * np.cross(up, AXIS)
+    axis /= np.linalg.norm(axis)
     rest = cables_in_body(model, start.position, start.R_world_body)
     turned = [
-        float(np.mean(np.cross(rest, cables_in_body(model, x[:3], R)) @ AXIS))
+        float(np.mean(np.cross(rest, cables_in_body(model, x[:3], R)) @ axis))
         for x, R in zip(motion.states, motion.R_world_body, strict=True)
     ]
     return 0.5 * stiffness * np.array(turned) ** 2
 
 
-def test_hinges_that_hold_against_rolling_keep_energy() -> None:
+@pytest.mark.parametrize("skew", [0.0, 0.6])
+def test_hinges_that_hold_against_rolling_keep_energy(skew: float) -> None:
     sample, stiffness = thesis_case_14(), 3e4
-    model = rolling(sample.model(rods=True), sample.start, stiffness)
+    model = rolling(sample.model(rods=True), sample.start, stiffness, skew)
     motion = simulate(model, sample.start, Input.none(501, 0.01), substeps=8)
     kinetic, potential = kinetic_and_potential(model, motion)
-    strain = strain_energy(model, motion, sample.start, stiffness)
+    strain = strain_energy(model, motion, sample.start, stiffness, skew)
     assert np.max(strain) > 0.01 * np.ptp(kinetic)
     assert np.ptp(kinetic + potential + strain) < 1e-6 * np.ptp(kinetic)
 
@@ -89,27 +97,88 @@ def test_hinges_that_bend_but_twist_freely_lack_the_twist_alone() -> None:
     np.testing.assert_allclose(lost["DAMPING"] - lost["BENDING"], damping * np.sum(twist**2) / 2.0, rtol=1e-2)
 
 
-def test_air_resists_turning_with_the_square_of_the_rate() -> None:
-    sample, size = random_sample(3, 3), 40.0
-    motion = simulate(having(falling(sample), TURNING_DRAG=size), spinning(sample), Input.none(11, 0.01))
+def wrench_left(sample: Sample, start: State, model: RigModel) -> tuple[Array, Array]:
+    """Force (3,) besides weight and moment (3,) about the centre of mass, body axes, at ``start``."""
+    outputs = simulate(model, start, Input.none(11, 0.01)).outputs[0]
+    specific = outputs[layout.OUT_SPECIFIC_FORCE :][:3]
+    alpha, rate, center = outputs[layout.OUT_ANGULAR_ACCELERATION :][:3], start.rate, sample.elements[1:4]
     xx, xy, xz, yy, yz, zz = sample.elements[4:]
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    alpha = motion.outputs[0, layout.OUT_ANGULAR_ACCELERATION :][:3]
-    moment = J @ alpha + np.cross(SPIN, J @ SPIN)
-    np.testing.assert_allclose(moment, -0.5 * AIR * size * np.linalg.norm(SPIN) * SPIN, rtol=1e-6)
+    felt = specific + np.cross(alpha, center) + np.cross(rate, np.cross(rate, center))
+    return sample.elements[0] * felt, J @ alpha + np.cross(rate, J @ rate)
+
+
+REACH = 0.7
+
+
+def plated(model: RigModel, facing_x: float, facing_y: float) -> RigModel:
+    """The model with plates in the air."""
+    physics = model.physics.copy()
+    block = place.effects_block(model.cables)
+    physics[block + place.PLATES :][:2] = facing_x, facing_y
+    return having(model.with_physics(physics), PLATE_REACH=REACH)
+
+
+def test_plates_resist_the_air_where_they_stand() -> None:
+    sample = random_sample(3, 3)
+    start = spinning(sample)
+    start = replace(start, velocity=start.velocity + np.array([0.3, -0.5, 0.2]))
+    force, moment = wrench_left(sample, start, plated(falling(sample), 40.0, 25.0))
+    center = start.R_world_body.T @ start.velocity + np.cross(SPIN, sample.elements[1:4])
+    wanted, about = np.zeros(3), np.zeros(3)
+    for axis, area in ((0, 40.0), (1, 25.0)):
+        for side in (-REACH, REACH):
+            at, normal = side * np.eye(3)[1 - axis], np.eye(3)[axis]
+            u = (center + np.cross(SPIN, at))[axis]
+            push = -0.5 * AIR * 0.5 * area * abs(u) * u * normal
+            wanted += push
+            about += np.cross(at, push)
+    np.testing.assert_allclose(force, wanted, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(moment, about, rtol=1e-6, atol=1e-6)
+
+
+def test_a_turn_damps_a_slow_swing_in_proportion_to_both() -> None:
+    """rho C r |w| v against the swing and 1/2 rho C r^3 |w| w against the turn."""
+    sample, area, rate = random_sample(3, 3), 40.0, 2.0
+    spin = np.array([0.0, 0.0, rate])
+    R = sample.start.R_world_body
+    start = State(
+        sample.start.position,
+        R,
+        R @ (np.array([0.01, 0.0, 0.0]) - np.cross(spin, sample.elements[1:4])),
+        spin,
+    )
+    force, moment = wrench_left(sample, start, plated(falling(sample), area, 0.0))
+    assert force[0] == pytest.approx(-AIR * area * REACH * rate * 0.01, rel=1e-3)
+    assert moment[2] == pytest.approx(-0.5 * AIR * area * REACH**3 * rate**2, rel=1e-3)
+
+
+def test_a_cube_of_the_turn_turns_back_about_the_vertical() -> None:
+    sample, amount, turn = random_sample(3, 3), 300.0, 0.4
+    physics = falling(sample).physics.copy()
+    block = place.effects_block(falling(sample).cables)
+    physics[block + place.REFERENCE_ROTATION :][:9] = sample.start.R_world_body.ravel()
+    model = having(falling(sample).with_physics(physics), TURNING_CUBE=amount)
+    R = Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix() @ sample.start.R_world_body
+    start = State(sample.start.position, R, np.zeros(3), np.zeros(3))
+    force, moment = wrench_left(sample, start, model)
+    np.testing.assert_allclose(R @ moment, [0.0, 0.0, -amount * np.sin(turn) ** 3], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(force, np.zeros(3), rtol=0.0, atol=1e-7)
 
 
 def test_derivatives_with_all_of_them() -> None:
     sample = random_sample(5, 3)
     plain = sample.model(rods=True)
-    model = having(rolling(plain, sample.start, 2e3), BENDING=20.0, TURNING_DRAG=5.0)
+    model = having(rolling(plated(plain, 5.0, 3.0), sample.start, 2e3, 0.4), BENDING=20.0, TURNING_CUBE=200.0)
     state, drive = moving(sample, model, 5), drive_of(61, 0.01, 5)
     o = layout.cable_offset(1)
     entries = [layout.INERTIAL, layout.INERTIAL + 3, layout.INERTIAL + 7, layout.GRAVITY]
     entries += [o + layout.LENGTH, o + layout.BODY_POINT + 1, o + layout.CEILING_POINT]
     check_physics(model, state, drive, entries, 1e-6)
     block = place.effects_block(model.cables)
-    own = {name: block + getattr(place, name) for name in ("BENDING", "ROLL_STIFFNESS", "TURNING_DRAG")}
+    names = ("BENDING", "ROLL_STIFFNESS", "ROLL_SKEW", "PLATES", "TURNING_CUBE")
+    own = {name: block + getattr(place, name) for name in names}
+    own["the other PLATES"] = block + place.PLATES + 1
     exact = simulate(model, state, drive, directions=np.array(list(own.values())), substeps=SUBSTEPS)
     assert exact.J is not None
     for k, (name, entry) in enumerate(own.items()):
@@ -122,4 +191,6 @@ def test_derivatives_with_all_of_them() -> None:
                 ends.append(simulate(model.with_physics(physics), state, drive, substeps=SUBSTEPS))
             return outputs_difference(*ends, h)
 
-        assert_close(exact.J[:, :, k], richardson(difference, 0.1), name, 1e-6)
+        assert_close(
+            exact.J[:, :, k], richardson(difference, 0.01 if name == "ROLL_SKEW" else 0.1), name, 1e-6
+        )

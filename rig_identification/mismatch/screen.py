@@ -115,7 +115,7 @@ def screen(
     if full is None:
         return []
     added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
-    base = _base(wide, point, full, added, wide.bench.parameters.model.states - model.states)
+    base = free_without(wide, point, full, added, wide.bench.parameters.model.states - model.states)
     out = [_promise(wide, point, full, base, c) for c in candidates]
     for probe in (_promise(wide, point, full, base, c) for c in probes):
         out += _supports(problem, mass, probe)
@@ -129,8 +129,10 @@ def screen(
     return sorted(out, key=lambda promise: -promise.gain)
 
 
-def _base(wide: Problem, point: Point, full: Evaluation, added: set[str], probed: int) -> NDArray[np.int64]:
-    """Unknowns that are free without any candidate. probed: states that probes add."""
+def free_without(
+    wide: Problem, point: Point, full: Evaluation, added: set[str], probed: int
+) -> NDArray[np.int64]:
+    """Unknowns that are free without any candidate. added: candidates' names; probed: states of probes."""
     at_bound = np.zeros(full.information.shape[0], dtype=bool)
     for i, q in enumerate(wide.bench.parameters.free, start=INERTIAL):
         if q.name in added:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -45,34 +44,74 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
             positive=1,
             name_in_result="damping",
         ),
+        *(_plates(rig, block, size, k) for k in range(2)),
         Candidate(
-            "air_drag",
-            (added("air.turning", "m^5", 3.0 * size**2 * (0.5 * size) ** 3, block + place.TURNING_DRAG),),
-            "The air resists the body's turning with the square of its rate, as a plate of Cd A = {value} "
-            "does that stands across its way at the outermost hinges' distance.",
-            "Turn it slowly, or keep the drag in the model.",
-            {"channel": None, "axis": None},
-            positive=1,
-            tell=_as_plate(0.5 * size),
+            "unknown",
+            (
+                added(
+                    "turning.cube",
+                    "N*m",
+                    mass * rig.gravity * (0.5 * size) ** 2 / length,
+                    block + place.TURNING_CUBE,
+                ),
+            ),
+            "What turns the body back about the vertical does not grow in proportion: a moment of {value} "
+            "times the cube of the turn's sine comes besides (negative: wide turns are slower than small). "
+            "Air that goes along with wide turns does that, or hinges that slip.",
+            "For the inertia about the vertical use small turns; a plate of known size hung beside tells air "
+            "from hinges.",
+            {"channel": None, "axis": "z"},
+            name_in_result="cubic_moment",
+            experiment="small turns, or the same ones in which a plate of known size turns along",
         ),
     ]
     line = _line_of_hinges(rig)
     return out if line is None else [*out, _rolling(rig, mass, size, line)]
 
 
-def _as_plate(distance: float) -> Callable[[dict[str, float], dict[str, float]], Told]:
-    """What resists turning, as the drag area of a plate at a ``distance`` (m) from the axis, and as it is."""
+def _plates(rig: Rig, block: int, size: float, face: int) -> Candidate:
+    """Air against the sides of a body that face along x (``face`` 0) or y, at the hinges' distance."""
+    axis, reach = "xy"[face], 0.5 * size
+    plates = added(f"air.plates_{axis}", "m^2", 3.0 * size**2, block + place.PLATES + face)
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        physics = model.physics.copy()
+        physics[block + place.PLATE_REACH] = reach
+        return model.with_physics(physics), (plates,)
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        value, std = values["air.turning"], stds["air.turning"]
+        value, std = values[plates.name], stds[plates.name]
         return {
-            "drag_area": (value / distance**3, std / distance**3, "m^2"),
-            "turning_drag": (value, std, "m^5"),
+            "drag_area": (value, std, "m^2"),
+            "turning_drag": (value * reach**3, std * reach**3, "m^5"),
         }
 
-    return told
+    return Candidate(
+        "air_drag",
+        (plates,),
+        f"The air resists the sides of the body that face its {axis} axis, as plates of Cd A = {{value}} "
+        "do at the outermost hinges' distance: against turning, and against swinging the more the "
+        "faster it turns.",
+        "Turn it slowly, or keep the drag in the model.",
+        {"channel": None, "axis": axis},
+        positive=1,
+        tell=told,
+        build=build,
+    )
 
 
+def _as_hinges(values: dict[str, float], stds: dict[str, float]) -> Told:
+    """Hinges that hold against rolling: how stiffly, and how far off the line of hinges their axis is."""
+    stiffness, skew = "hinge.roll_stiffness", "hinge.roll_skew"
+    angle = float(np.arctan(values[skew]))
+    return {
+        "roll_stiffness": (values[stiffness], stds[stiffness], "N*m/rad"),
+        "axis_angle": (angle, stds[skew] * float(np.cos(angle)) ** 2, "rad"),
+    }
+
+
+#: Std of the angle (rad) between the line of hinges and the axis about which they hold: bridles tied by hand.
+SKEW = 0.3
 #: Share of a body axis in the line of the hinges above which its elements have to do with rolling about it.
 ALONG = 0.1
 
@@ -92,12 +131,13 @@ def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
     block = layout.effects_offset(len(rig.cables))
     axis = block + place.ROLL_AXIS
     roll = added("hinge.roll_stiffness", "N*m/rad", mass * rig.gravity * size, block + place.ROLL_STIFFNESS)
+    skew = added("hinge.roll_skew", "1", SKEW, block + place.ROLL_SKEW)
     height = float(np.mean([c.body_point[2] for c in rig.cables]))
 
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
         physics = model.physics.copy()
         physics[axis : axis + 3] = line
-        return model.with_physics(physics), (roll,)
+        return model.with_physics(physics), (roll, skew)
 
     def settle(problem: Problem, point: Point, evaluation: Evaluation) -> Point:
         """A body that such hinges alone keep upright: a fit without them holds it far below the hinges."""
@@ -115,14 +155,14 @@ def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
 
     return Candidate(
         "unknown",
-        (roll,),
+        (roll, skew),
         "The body is not free to roll about the line of its hinges: a moment of {value} holds it against the "
         "mean direction of its cables, as a bridle, a loop round a bar or a stiff knot does. What such "
         "hinges do to the turning about the vertical cannot be told from inertia, and is left out.",
         "Hang the body on single points, or keep the stiffness in the model.",
         {"channel": None, "axis": None, "end": "body"},
         positive=1,
-        name_in_result="roll_stiffness",
+        tell=_as_hinges,
         build=build,
         settle=settle,
         hides=hidden_by_roll(line),

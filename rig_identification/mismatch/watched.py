@@ -18,7 +18,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import Ideal, Scores, judged, parameter_estimates
 from rig_identification.estimate.launch import launch_state
-from rig_identification.estimate.observability import testimony
+from rig_identification.estimate.observability import invert_information, testimony
 from rig_identification.estimate.segments import PIECE, in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
@@ -28,9 +28,10 @@ from rig_identification.mismatch.findings import finding, rival
 from rig_identification.mismatch.hands import hand_finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.screen import carried, extended, with_reference
+from rig_identification.mismatch.screen import carried, extended, free_without, with_reference
+from rig_identification.mismatch.subsets import best_subset
 from rig_identification.mismatch.threads import physics_of_pendulums
-from rig_identification.mismatch.trial import Trial, finished, log_evidence, mass_of, signs
+from rig_identification.mismatch.trial import Trial, finished, log_evidence, mass_of
 from rig_identification.result import ELEMENTS, Mismatch
 
 Notify = Callable[[str, float], None]
@@ -44,8 +45,8 @@ STEPS = 8
 WHOLE_STEPS = 20
 #: Where a hypothesis starts, in units of its prior's std.
 FIRST_VALUE = 0.02
-#: Std by which an effect must differ from nothing beside all others.
-SHOWS = 2.0
+#: Times that the choice of effects is made anew about the fit of the one before.
+ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -115,74 +116,149 @@ def _better(
     return sorted(tried, key=lambda t: -t.evidence)
 
 
+@dataclass(frozen=True)
+class Choice:
+    """Which effects are in the model of a watched body."""
+
+    chosen: tuple[Candidate, ...]
+    holding: tuple[Candidate, ...]  # what changes the body's freedom: stays
+    others: tuple[Candidate, ...]  # all that are chosen from
+    alone: tuple[Trial, ...]  # what damps, each by itself, likeliest first
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the chosen effects' first parameters."""
+        return tuple(c.parameters[0].name for c in self.chosen)
+
+    @property
+    def effects(self) -> tuple[Candidate, ...]:
+        """All that is in the model."""
+        return (*self.chosen, *self.holding)
+
+    @property
+    def rivals(self) -> tuple[dict[str, object], ...]:
+        """What by itself would damp less well than the likeliest does, and is not in the model."""
+        return tuple(rival(t, self.alone[0]) for t in self.alone[1:] if t.candidate not in self.chosen)
+
+
 def _damped(
-    raw: Problem, problem: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
-) -> tuple[list[Trial], Evaluation, list[dict[str, object]]]:
-    """Effects added one by one while each gains more than chance, the fit, and rivals of the first.
+    raw: Problem, base: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
+) -> tuple[Choice, Problem, Evaluation] | None:
+    """The effects that belong into the model together, and its fit to pieces; None: nothing damps.
 
-    What damps comes first, for no swing is followed without it; then what changes the body's freedom, which
-    is no matter of degree; then what damps besides.
+    What damps most comes first, for no swing is followed without it; then what changes the body's freedom,
+    which is no matter of degree. Beside that all others are chosen anew, until the choice stays.
     """
-    found: list[Trial] = []
-    rivals: list[dict[str, object]] = []
     dampers = [c for c in candidates if c.effect in DAMPERS]
-    holds = [c for c in candidates if c.effect not in DAMPERS]
-    base_problem, count, left = problem, len(candidates), dampers
-    while left or holds:
+    holds = [c for c in candidates if c.hides]
+    count = len(candidates)
 
-        def told(stage: str) -> None:
-            notify(stage, 0.2 + 0.1 * len(found))
+    def told(share: float) -> Callable[[str], None]:
+        return lambda stage: notify(stage, share)
 
-        tried = _better(problem, evaluation, left, count, told)
-        if tried:
-            if not found:
-                rivals = [rival(t, tried[0]) for t in tried[1:]]
-            found.append(tried[0])
-            problem, evaluation = tried[0].problem, tried[0].evaluation
-        if holds:
-            held = _better(problem, evaluation, holds, count, told)
-            holds = []
-            if held:
-                problem, evaluation = _weighed(raw, held[0].problem, held[0].evaluation)
-                found.append(replace(held[0], problem=problem, evaluation=evaluation))
-        elif not tried:
+    tried = _better(base, evaluation, dampers, count, told(0.2))
+    if not tried:
+        return None
+    first = tried[0]
+    held = _better(first.problem, first.evaluation, holds, count, told(0.35))
+    others = tuple(c for c in candidates if c not in holds)
+    choice = Choice((first.candidate,), (), others, tuple(tried))
+    free = _settled(raw, base, first, choice, told(0.4))
+    if not held:
+        return free
+    # What changes the body's freedom may have stood in for what was not in the model yet
+    choice = replace(choice, holding=(held[0].candidate,))
+    bound = _settled(raw, base, held[0], choice, told(0.5))
+    fair = replace(free[1], runs=bound[1].runs)
+    fitted, _ = solve(fair, free[2].point, iterations=STEPS, tolerance=0.5)
+    # What follows the motion counts as one error, not as many small ones
+    gain = (log_evidence(bound[2]) - log_evidence(fitted)) / coherence(*bound[1:])
+    return bound if gain > needed_gain(held[0].candidate, count) else free
+
+
+def _settled(
+    raw: Problem, base: Problem, now: Trial, choice: Choice, notify: Callable[[str], None]
+) -> tuple[Choice, Problem, Evaluation]:
+    """Effects chosen anew about each fit until the choice stays or returns. now: the fit of the first."""
+    problem, evaluation = _weighed(raw, now.problem, now.evaluation)
+    seen = {choice.labels}
+    for _ in range(ROUNDS):
+        notify("search: which effects together")
+        again = _together(base, problem, evaluation, choice)
+        if again.labels in seen:
             break
-        names = {t.candidate.parameters[0].name for t in found}
-        left = [c for c in dampers if c.parameters[0].name not in names] if found else []
-    return (*_needed(base_problem, found, evaluation), rivals)
+        seen.add(again.labels)
+        changed, fitted = _exchanged(base, problem, evaluation, choice, again)
+        choice = again
+        problem, evaluation = _weighed(raw, changed, fitted)
+    return choice, problem, evaluation
 
 
-def _needed(problem: Problem, found: list[Trial], evaluation: Evaluation) -> tuple[list[Trial], Evaluation]:
-    """The effects less those that a later one left with nothing, fitted again without them."""
-    kept = [t for t in found if signs(replace(found[-1], candidate=t.candidate))[0] > SHOWS]
-    if not found or not kept or len(kept) == len(found):
-        return found, evaluation
-    wide = extended(problem, tuple(t.candidate for t in kept))
-    point = carried(wide, found[-1].problem, evaluation.point)
-    fitted, _ = solve(wide, point, iterations=STEPS, tolerance=0.5)
-    return [replace(t, problem=wide, evaluation=fitted) for t in kept], fitted
+def _exchanged(
+    base: Problem, problem: Problem, evaluation: Evaluation, before: Choice, after: Choice
+) -> tuple[Problem, Evaluation]:
+    """A fit with one choice made one with another. base: without any effect."""
+    changed = extended(replace(base, runs=problem.runs), after.effects)
+    point = carried(changed, problem, evaluation.point)
+    theta = point.theta.copy()
+    for candidate in after.chosen:
+        if candidate not in before.chosen:
+            theta[changed.bench.parameters.index_of(candidate.parameters[0].name)] = FIRST_VALUE
+    fitted, _ = solve(changed, replace(point, theta=theta), iterations=STEPS, tolerance=0.5)
+    return changed, fitted
 
 
-def _whole(ideal: Fitted, found: list[Trial], weights: Problem, evaluation: Evaluation) -> Fitted:
-    """Whole runs fitted with the effects, weighed as in ``weights``, then scored with the sensors' noise."""
-    last = found[-1]
-    wide = replace(ideal.problem, bench=last.problem.bench, weak_center=last.problem.weak_center)
+def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
+    """Which effects belong into the model, by what all at once promise about a fit with some (subsets.py).
+
+    base: without any effect; problem, evaluation: the fit with those of ``choice``.
+    """
+    candidates = choice.others
+    wide = extended(replace(base, runs=problem.runs), (*choice.holding, *candidates))
+    point = carried(wide, problem, evaluation.point)
+    full = evaluate(wide, point)
+    if full is None:
+        return choice
+    parameters = wide.bench.parameters
+    groups = [[parameters.index_of(p.name) for p in c.parameters] for c in candidates]
+    mine = [i for group in groups for i in group]
+    rest = free_without(wide, point, full, {p.name for c in candidates for p in c.parameters}, 0)
+    index = np.concatenate([rest, np.array(mine, dtype=rest.dtype)])
+    covariance = invert_information(full.information[np.ix_(index, index)])
+    best = point.theta[mine] + (covariance @ full.gradient[index])[rest.size :]
+    place = {i: k for k, i in enumerate(mine)}
+    kept = best_subset(
+        best,
+        covariance[rest.size :, rest.size :],
+        [[place[i] for i in group] for group in groups],
+        [c.positive > 0 for c in candidates],
+        [needed_gain(c, len(candidates)) for c in candidates],
+    )
+    return replace(choice, chosen=tuple(candidates[k] for k in kept))
+
+
+def _begun_whole(ideal: Fitted, weights: Problem, evaluation: Evaluation) -> tuple[Problem, Point]:
+    """Whole runs with the effects of ``weights``, weighed as there, and where their fit starts."""
     noise = {(c.device, c.quantity): c.noise for run in weights.runs for c in run.channels}
     runs = tuple(
         replace(run, channels=tuple(replace(c, noise=noise[c.device, c.quantity]) for c in run.channels))
-        for run in wide.runs
+        for run in ideal.problem.runs
     )
-    heavy = replace(wide, runs=runs)
+    heavy = replace(ideal.problem, runs=runs, bench=weights.bench, weak_center=weights.weak_center)
     theta = evaluation.point.theta
-    starts = tuple(launch_state(wide.bench, run, theta, ideal.rest) for run in runs)
+    starts = tuple(launch_state(heavy.bench, run, theta, ideal.rest) for run in runs)
     point = Point(theta, starts, evaluation.point.rest_guesses)
-    point = replace(point, starts=settled_starts(heavy, point))
-    fitted, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
-    scored = evaluate(wide, fitted.point)
+    return heavy, replace(point, starts=settled_starts(heavy, point))
+
+
+def _scored(ideal: Fitted, heavy: Problem, evaluation: Evaluation, converged: bool) -> Fitted:
+    """A fit to whole runs, scored with the sensors' noise, and what it predicts."""
+    wide = replace(ideal.problem, bench=heavy.bench, weak_center=heavy.weak_center)
+    scored = evaluate(wide, evaluation.point)
     if scored is None:
         raise FloatingPointError("the fitted motion cannot be followed")
     held_runs, held, lost = predicted(
-        wide, (*ideal.holdout_runs, *ideal.lost), fitted.point.theta, ideal.rest
+        wide, (*ideal.holdout_runs, *ideal.lost), evaluation.point.theta, ideal.rest
     )
     return replace(
         ideal,
@@ -213,13 +289,17 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     mass = mass_of(parts, evaluation)
     candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
     candidates += physics_of_pendulums(rig, mass)
-    found, damped, rivals = _damped(raw, parts, evaluation, candidates, notify)
-    if not found:
+    answer = _damped(raw, parts, evaluation, candidates, notify)
+    if answer is None:
         return None
-    notify("weighing each channel by its residual", 0.75)
-    careful = _tempered(*solve_cautiously(replace(found[-1].problem, runs=raw.runs), damped.point))
-    notify("search: whole runs", 0.85)
-    fitted = _whole(ideal, found, careful[0], careful[1])
+    choice, problem, damped = answer
+    notify("weighing each channel by its residual", 0.65)
+    careful = _tempered(*solve_cautiously(replace(problem, runs=raw.runs), damped.point))
+    notify("search: whole runs", 0.75)
+    heavy, point = _begun_whole(ideal, *careful)
+    whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
+    fitted = _scored(ideal, heavy, whole, converged)
+    found = [Trial(c, heavy, whole, log_evidence(whole), True) for c in choice.effects]
     after, verdict = judged(fitted)
     values = {p.name: p.value for p in parameter_estimates(fitted.problem, fitted.evaluation)}
     stds = {p.name: p.std for p in parameter_estimates(fitted.problem, careful[1])}
@@ -231,11 +311,11 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     named = ", ".join(f.effect for f in findings)
     if verdict.verdict == "none":
         mismatch = Mismatch(
-            "explained", f"With {named} in the model every residual is noise.", tuple(findings), tuple(rivals)
+            "explained", f"With {named} in the model every residual is noise.", tuple(findings), choice.rivals
         )
     else:
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
-        mismatch = Mismatch("unexplained", text, tuple(findings), tuple(rivals))
+        mismatch = Mismatch("unexplained", text, tuple(findings), choice.rivals)
     hidden = {name for t in found for name in t.candidate.hides}
     lost = hidden | set(testimony(*careful, _missed(fitted, after)))
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))

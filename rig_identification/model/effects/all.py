@@ -6,7 +6,7 @@ from numba import njit
 
 from rig_identification.model.effects.air_added_mass import add_air_added_mass
 from rig_identification.model.effects.air_drag import add_air_drag
-from rig_identification.model.effects.air_turning import add_air_turning
+from rig_identification.model.effects.air_plates import add_air_plates
 from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.gyroscopic_share import add_gyroscopic_share
@@ -23,12 +23,14 @@ from rig_identification.model.effects.place import (
     FRICTION,
     GYROSCOPIC_SHARE,
     LINEAR_DENSITY,
+    PLATES,
     ROLL_STIFFNESS,
     ROTOR_MASS,
     TETHER_POINT,
     active,
 )
 from rig_identification.model.effects.tether import add_tether
+from rig_identification.model.effects.turning_cube import add_turning_cube
 from rig_identification.model.layout import CABLE_SIZE, CABLES
 
 
@@ -40,6 +42,7 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
         return False, False, False, False
     body = active(physics[block + DRAG_AREA]) or active(physics[block + ADDED_MASS])
     body = body or active(physics[block + GYROSCOPIC_SHARE])
+    body = body or active(physics[block + PLATES]) or active(physics[block + PLATES + 1])
     rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
     hinges = hinges or active(physics[block + BENDING]) or active(physics[block + ROLL_STIFFNESS])
@@ -69,7 +72,8 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     add_hinge_bending(physics, block, modes, x, R, r)
     add_hinge_roll(physics, block, modes, x, R, r)
     add_air_drag(physics, block, x, R, r)
-    add_air_turning(physics, block, x, r)
+    add_air_plates(physics, block, x, R, r)
+    add_turning_cube(physics, block, R, r)
     add_air_added_mass(physics, block, x, K, r)
     add_exciter_rotor(physics, block, x, R, K, r)
     add_gyroscopic_share(physics, block, x, r)

@@ -6,7 +6,9 @@ puts the moments k s/n e_i x (a x f_i) on the body and the reverse on the cables
 held by forces across them (hinge_damping.py). It is the mean that counts: where the body turns about the
 vertical the cables lean to opposite sides, and what hinges do against that acts like the cables' own
 pull, which no motion tells from the inertia about the vertical. A bridle whose legs meet a height h
-above the hinges acts like k = W h, W being the body's weight.
+above the hinges acts like k = W h, W being the body's weight. Legs that do not lie square to the line
+of hinges hold about another axis: a is the given one turned about the vertical at rest by an angle of
+tangent ROLL_SKEW, and sway along the cables' plane then goes with sway across it.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from rig_identification.model.effects.place import (
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
     ROLL_AXIS,
+    ROLL_SKEW,
     ROLL_STIFFNESS,
     active,
 )
@@ -38,13 +41,30 @@ def _direction(physics, o, p0, p1, p2, R):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _axis(physics, block, rest):  # type: ignore[no-untyped-def]
+    """Unit vector about which the hinges hold, body axes. rest: (3, 3) R_world_body at rest."""
+    ax, ay, az = physics[block + ROLL_AXIS], physics[block + ROLL_AXIS + 1], physics[block + ROLL_AXIS + 2]
+    skew = physics[block + ROLL_SKEW]
+    if not active(skew):
+        return ax, ay, az
+    ux, uy, uz = rest[2, 0], rest[2, 1], rest[2, 2]
+    ax, ay, az = (
+        ax + skew * (uy * az - uz * ay),
+        ay + skew * (uz * ax - ux * az),
+        az + skew * (ux * ay - uy * ax),
+    )
+    scale = reciprocal(root(ax * ax + ay * ay + az * az))
+    return ax * scale, ay * scale, az * scale
+
+
+@njit(cache=True)
 def add_hinge_roll(physics, block, modes, x, R, r):  # type: ignore[no-untyped-def]
     """Add the force and moment of hinges that hold against rolling to r."""
     stiffness = physics[block + ROLL_STIFFNESS]
     if not active(stiffness):
         return
-    ax, ay, az = physics[block + ROLL_AXIS], physics[block + ROLL_AXIS + 1], physics[block + ROLL_AXIS + 2]
     rest = physics[block + REFERENCE_ROTATION : block + REFERENCE_ROTATION + 9].reshape(3, 3)
+    ax, ay, az = _axis(physics, block, rest)
     p = block + REFERENCE_POSITION
     turned, taut = 0.0 * stiffness, 0.0
     for i in range(modes.shape[0]):

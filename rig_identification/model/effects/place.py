@@ -19,16 +19,19 @@ LINEAR_DENSITY = 5  # kg/m
 GYROSCOPIC_SHARE = 6  # 1: share of the gyroscopic moment that the model lacks
 BENDING = 7  # N m s/rad
 ROLL_STIFFNESS = 8  # N m/rad
-TURNING_DRAG = 9  # m^5
-TETHER_STIFFNESS = 10  # 3: N/m, world axes
-TETHER_PULL = 13  # 3: N, world axes
-TETHER_POINT = 16  # 3: m, body
-REFERENCE_POSITION = 19  # 3: m, world
-REFERENCE_ROTATION = 22  # 9: rotation matrix, row by row
-ROLL_AXIS = 31  # 3: unit vector in body, a constant of the session like the reference pose
-SHARING = 34  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-CREEP = 35  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
-EFFECTS_SIZE = 36
+TURNING_CUBE = 9  # N m
+PLATES = 10  # 2: m^2, facing the body's x and y axis
+TETHER_STIFFNESS = 12  # 3: N/m, world axes
+TETHER_PULL = 15  # 3: N, world axes
+TETHER_POINT = 18  # 3: m, body
+REFERENCE_POSITION = 21  # 3: m, world
+REFERENCE_ROTATION = 24  # 9: rotation matrix, row by row
+ROLL_AXIS = 33  # 3: unit vector in body, a constant of the session like the reference pose
+ROLL_SKEW = 36  # tangent of the angle about the vertical between ROLL_AXIS and the axis that hinges hold
+PLATE_REACH = 37  # m, a constant of the session
+SHARING = 38  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+CREEP = 39  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
+EFFECTS_SIZE = 40
 
 
 def effects_block(cables: int) -> int:

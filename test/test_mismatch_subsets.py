@@ -1,0 +1,60 @@
+"""Subsets of effects by one linearisation, against the evidence of each subset."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from rig_identification.mismatch.subsets import best_subset
+
+
+def posterior(design: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Best (n,) and covariance (n, n) with unit noise and unit prior."""
+    covariance = np.linalg.inv(design.T @ design + np.eye(design.shape[1]))
+    return covariance @ design.T @ data, covariance
+
+
+def evidence(design: np.ndarray, data: np.ndarray) -> float:
+    """Log marginal likelihood of a linear model with unit noise and unit prior, less a constant."""
+    total = design @ design.T + np.eye(data.size)
+    return float(-0.5 * data @ np.linalg.solve(total, data) - 0.5 * np.linalg.slogdet(total)[1])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_best_subset_is_the_one_of_the_highest_evidence(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    design = rng.standard_normal((60, 5)) @ (np.eye(5) + 0.8 * rng.standard_normal((5, 5)))
+    truth = np.array([0.6, 0.0, -0.5, 0.0, 0.0])
+    data = design @ truth + rng.standard_normal(60)
+    groups = [[0], [1, 2], [3], [4]]
+    best, covariance = posterior(design, data)
+    found = best_subset(best, covariance, groups, [False] * 4, [1.0] * 4)
+    scores = {}
+    for count in range(5):
+        for kept in combinations(range(4), count):
+            columns = [i for k in kept for i in groups[k]]
+            scores[kept] = evidence(design[:, columns], data) - float(count)
+    assert found == max(scores, key=lambda kept: scores[kept])
+
+
+def test_two_that_explain_together_what_a_third_takes_alone_are_found() -> None:
+    """The third is nearly their sum: adding one at a time takes it first and asks for nothing else."""
+    rng = np.random.default_rng(4)
+    one, two = rng.standard_normal((2, 200))
+    third = one + two + 0.3 * rng.standard_normal(200)
+    design = np.stack([one, two, third], axis=1)
+    data = 2.0 * one + 2.0 * two + rng.standard_normal(200)
+    alone = [evidence(design[:, [k]], data) for k in range(3)]
+    assert int(np.argmax(alone)) == 2
+    assert best_subset(*posterior(design, data), [[0], [1], [2]], [True] * 3, [3.0] * 3) == (0, 1)
+
+
+def test_what_cannot_be_negative_is_left_out_where_it_would_be() -> None:
+    rng = np.random.default_rng(5)
+    design = rng.standard_normal((100, 2))
+    data = design @ [1.5, -1.5] + rng.standard_normal(100)
+    best, covariance = posterior(design, data)
+    assert best_subset(best, covariance, [[0], [1]], [True, True], [2.0, 2.0]) == (0,)
+    assert best_subset(best, covariance, [[0], [1]], [True, False], [2.0, 2.0]) == (0, 1)
