@@ -1,14 +1,12 @@
 """What takes the energy out of a body that is only watched to swing.
 
 Motion capture alone sees no force: of all that the ideal model may lack it tells apart what changes
-how a swing dies away. The few effects that do are fitted to pieces of several periods, with every
-channel weighed by what its residual really has, the likeliest are added one by one, and the whole
-runs are then fitted with them.
+how a swing dies away, and what turns the body back. The few effects that do are chosen on pieces of
+several periods (swing_effects.py), and the whole runs are then fitted with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,35 +16,24 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import Ideal, Scores, judged, parameter_estimates
 from rig_identification.estimate.launch import launch_state
-from rig_identification.estimate.observability import invert_information, testimony
+from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import PIECE, in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
-from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import evidence_of
-from rig_identification.mismatch.findings import finding, rival
+from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hands import hand_finding
-from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.screen import carried, extended, free_without, with_reference
-from rig_identification.mismatch.subsets import best_subset
+from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Notify, damped
 from rig_identification.mismatch.threads import physics_of_pendulums
-from rig_identification.mismatch.trial import Trial, finished, log_evidence, mass_of
+from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
 from rig_identification.result import ELEMENTS, Mismatch
 
-Notify = Callable[[str, float], None]
-
-#: Effects that change how a swing dies away.
-DAMPERS = ("hinge_damping", "hinge_friction", "air_drag")
 #: Length of the pieces, s: friction shows against the amplitude, which must change within one.
 LONG_PIECE = 2.0 * PIECE
-#: Steps of the fit of one hypothesis, and of the whole runs.
-STEPS = 8
+#: Steps of the fit of whole runs.
 WHOLE_STEPS = 20
-#: Where a hypothesis starts, in units of its prior's std.
-FIRST_VALUE = 0.02
-#: Times that the choice of effects is made anew about the fit of the one before.
-ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -57,36 +44,6 @@ class Watched:
     mismatch: Mismatch
     careful: tuple[Problem, Evaluation]
     unobservable: tuple[str, ...]  # beyond what the information matrix alone names
-
-
-def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Trial | None:
-    wide = extended(problem, (candidate,))
-    point = carried(wide, problem, evaluation.point)
-    theta = point.theta.copy()
-    theta[wide.bench.parameters.index_of(candidate.parameters[0].name)] = FIRST_VALUE
-    point, steps = replace(point, theta=theta), STEPS
-    if candidate.settle is not None:
-        # From another body: the way to its best is longer
-        point, steps = candidate.settle(wide, point, evaluation), 3 * STEPS
-    try:
-        fitted, _ = solve(wide, point, iterations=steps, tolerance=0.5)
-    except FloatingPointError:
-        return None
-    return finished(Trial(candidate, wide, fitted, log_evidence(fitted), True))
-
-
-def _weighed(raw: Problem, problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
-    """The model of ``problem`` on the pieces of ``raw``, each channel weighed by what it leaves now, fitted.
-
-    raw: pieces with the sensors' own noise. Weights that an earlier, poorer model set would hide from a
-    better one what it still leaves.
-    """
-    bare = replace(problem, runs=raw.runs)
-    now = evaluate(bare, evaluation.point)
-    if now is None:
-        return problem, evaluation
-    heavy = reweighted(bare, now)
-    return heavy, solve(heavy, evaluation.point, iterations=STEPS, tolerance=0.5)[0]
 
 
 def _tempered(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
@@ -101,140 +58,6 @@ def _tempered(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evalua
     )
     mild = replace(problem, runs=runs)
     return mild, solve(mild, evaluation.point, iterations=2 * STEPS, tolerance=0.1)[0]
-
-
-def _better(
-    problem: Problem, evaluation: Evaluation, left: list[Candidate], count: int, notify: Callable[[str], None]
-) -> list[Trial]:
-    """Trials that gain more than chance over ``count`` does, likeliest first."""
-    base, tried = log_evidence(evaluation), []
-    for candidate in left:
-        notify(f"search: {candidate.label}")
-        trial = _trial(problem, evaluation, candidate)
-        if trial is not None and trial.evidence - base > needed_gain(candidate, count):
-            tried.append(trial)
-    return sorted(tried, key=lambda t: -t.evidence)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Which effects are in the model of a watched body."""
-
-    chosen: tuple[Candidate, ...]
-    holding: tuple[Candidate, ...]  # what changes the body's freedom: stays
-    others: tuple[Candidate, ...]  # all that are chosen from
-    alone: tuple[Trial, ...]  # what damps, each by itself, likeliest first
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Names of the chosen effects' first parameters."""
-        return tuple(c.parameters[0].name for c in self.chosen)
-
-    @property
-    def effects(self) -> tuple[Candidate, ...]:
-        """All that is in the model."""
-        return (*self.chosen, *self.holding)
-
-    @property
-    def rivals(self) -> tuple[dict[str, object], ...]:
-        """What by itself would damp less well than the likeliest does, and is not in the model."""
-        return tuple(rival(t, self.alone[0]) for t in self.alone[1:] if t.candidate not in self.chosen)
-
-
-def _damped(
-    raw: Problem, base: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
-) -> tuple[Choice, Problem, Evaluation] | None:
-    """The effects that belong into the model together, and its fit to pieces; None: nothing damps.
-
-    What damps most comes first, for no swing is followed without it; then what changes the body's freedom,
-    which is no matter of degree. Beside that all others are chosen anew, until the choice stays.
-    """
-    dampers = [c for c in candidates if c.effect in DAMPERS]
-    holds = [c for c in candidates if c.hides]
-    count = len(candidates)
-
-    def told(share: float) -> Callable[[str], None]:
-        return lambda stage: notify(stage, share)
-
-    tried = _better(base, evaluation, dampers, count, told(0.2))
-    if not tried:
-        return None
-    first = tried[0]
-    held = _better(first.problem, first.evaluation, holds, count, told(0.35))
-    others = tuple(c for c in candidates if c not in holds)
-    choice = Choice((first.candidate,), (), others, tuple(tried))
-    free = _settled(raw, base, first, choice, told(0.4))
-    if not held:
-        return free
-    # What changes the body's freedom may have stood in for what was not in the model yet
-    choice = replace(choice, holding=(held[0].candidate,))
-    bound = _settled(raw, base, held[0], choice, told(0.5))
-    fair = replace(free[1], runs=bound[1].runs)
-    fitted, _ = solve(fair, free[2].point, iterations=STEPS, tolerance=0.5)
-    # What follows the motion counts as one error, not as many small ones
-    gain = (log_evidence(bound[2]) - log_evidence(fitted)) / coherence(*bound[1:])
-    return bound if gain > needed_gain(held[0].candidate, count) else free
-
-
-def _settled(
-    raw: Problem, base: Problem, now: Trial, choice: Choice, notify: Callable[[str], None]
-) -> tuple[Choice, Problem, Evaluation]:
-    """Effects chosen anew about each fit until the choice stays or returns. now: the fit of the first."""
-    problem, evaluation = _weighed(raw, now.problem, now.evaluation)
-    seen = {choice.labels}
-    for _ in range(ROUNDS):
-        notify("search: which effects together")
-        again = _together(base, problem, evaluation, choice)
-        if again.labels in seen:
-            break
-        seen.add(again.labels)
-        changed, fitted = _exchanged(base, problem, evaluation, choice, again)
-        choice = again
-        problem, evaluation = _weighed(raw, changed, fitted)
-    return choice, problem, evaluation
-
-
-def _exchanged(
-    base: Problem, problem: Problem, evaluation: Evaluation, before: Choice, after: Choice
-) -> tuple[Problem, Evaluation]:
-    """A fit with one choice made one with another. base: without any effect."""
-    changed = extended(replace(base, runs=problem.runs), after.effects)
-    point = carried(changed, problem, evaluation.point)
-    theta = point.theta.copy()
-    for candidate in after.chosen:
-        if candidate not in before.chosen:
-            theta[changed.bench.parameters.index_of(candidate.parameters[0].name)] = FIRST_VALUE
-    fitted, _ = solve(changed, replace(point, theta=theta), iterations=STEPS, tolerance=0.5)
-    return changed, fitted
-
-
-def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
-    """Which effects belong into the model, by what all at once promise about a fit with some (subsets.py).
-
-    base: without any effect; problem, evaluation: the fit with those of ``choice``.
-    """
-    candidates = choice.others
-    wide = extended(replace(base, runs=problem.runs), (*choice.holding, *candidates))
-    point = carried(wide, problem, evaluation.point)
-    full = evaluate(wide, point)
-    if full is None:
-        return choice
-    parameters = wide.bench.parameters
-    groups = [[parameters.index_of(p.name) for p in c.parameters] for c in candidates]
-    mine = [i for group in groups for i in group]
-    rest = free_without(wide, point, full, {p.name for c in candidates for p in c.parameters}, 0)
-    index = np.concatenate([rest, np.array(mine, dtype=rest.dtype)])
-    covariance = invert_information(full.information[np.ix_(index, index)])
-    best = point.theta[mine] + (covariance @ full.gradient[index])[rest.size :]
-    place = {i: k for k, i in enumerate(mine)}
-    kept = best_subset(
-        best,
-        covariance[rest.size :, rest.size :],
-        [[place[i] for i in group] for group in groups],
-        [c.positive > 0 for c in candidates],
-        [needed_gain(c, len(candidates)) for c in candidates],
-    )
-    return replace(choice, chosen=tuple(candidates[k] for k in kept))
 
 
 def _begun_whole(ideal: Fitted, weights: Problem, evaluation: Evaluation) -> tuple[Problem, Point]:
@@ -289,12 +112,12 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     mass = mass_of(parts, evaluation)
     candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
     candidates += physics_of_pendulums(rig, mass)
-    answer = _damped(raw, parts, evaluation, candidates, notify)
+    answer = damped(raw, parts, evaluation, candidates, notify)
     if answer is None:
         return None
-    choice, problem, damped = answer
+    choice, problem, parted = answer
     notify("weighing each channel by its residual", 0.65)
-    careful = _tempered(*solve_cautiously(replace(problem, runs=raw.runs), damped.point))
+    careful = _tempered(*solve_cautiously(replace(problem, runs=raw.runs), parted.point))
     notify("search: whole runs", 0.75)
     heavy, point = _begun_whole(ideal, *careful)
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
