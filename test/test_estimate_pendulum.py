@@ -186,6 +186,42 @@ def pendulum(length: float = 1.5, apart: float = 0.5) -> Rig:
     return Rig(9.80665, cables, 1.1, 0.002, noise=noise, tolerance=dict(DEFAULT_TOLERANCE))
 
 
+#: A cradle of half a metre in the air, and how its turn softens: about what the real one shows.
+SIDES, CUBE = 0.6, -0.17
+
+
+@pytest.fixture(scope="module")
+def in_the_air() -> Identification:
+    """The same, with air at its sides and a turn that softens, both concealed."""
+    elements = np.array([1.1, 0.01, 0.0, -0.08, 0.05, 0.0, 0.0, 0.04, 0.0, 0.075])
+    turned, less = (
+        Posed(np.array([0.01, y, -1.49]), Rotation.from_rotvec([0.0, 0.0, yaw]).as_quat())
+        for y, yaw in ((0.02, 0.3), (-0.01, 0.2))
+    )
+    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0)
+    runs = (RunSpec("run_1", 30.0, turned), RunSpec("run_2", 20.0, less, holdout=True))
+    effects = {"air_plates": (SIDES, 0.0), "air_plates.reach": (0.25,), "turning_cube": (CUBE,)}
+    session, _ = simulate_session(
+        SessionSpec("bifilar", pendulum(), elements, runs, rates=rates, effects=effects),
+        np.random.default_rng(5),
+    )
+    return identify(session)
+
+
+def test_air_and_a_softening_turn_are_told_apart_by_how_they_die(in_the_air: Identification) -> None:
+    """To first order in the turn they look like other dampers, and another inertia."""
+    sides = next(f for f in in_the_air.mismatch.findings if f.effect == "air_drag")
+    area = sides.parameters["drag_area"]
+    assert sides.where["axis"] == "x"
+    assert abs(area["value"] - SIDES) < 3.0 * area["std"]  # type: ignore[operator]
+    assert area["std"] < 0.1 * SIDES  # type: ignore[operator]
+    value, std = cubic_moment(in_the_air)
+    assert abs(value - CUBE) < 3.0 * std
+    assert std < 0.1 * abs(CUBE)
+    assert in_the_air.holdout_error == pytest.approx(1.0, abs=0.1)
+    assert in_the_air.figures["ideal"].holdout_error > 3.0
+
+
 @pytest.fixture(scope="module")
 def simulated() -> tuple[Identification, np.ndarray]:
     """Turned by 0.3 rad and let go, nothing concealed."""

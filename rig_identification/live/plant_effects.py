@@ -72,6 +72,9 @@ class PlantEffects:
     hinge_damping: float = 0.0  # N m s/rad, each hinge
     hinge_friction: float = 0.0  # N m, each hinge
     air_drag: float = 0.0  # m^2, Cd A
+    air_plates: Array = field(default_factory=lambda: np.zeros(2))  # m^2, Cd A of sides facing body x and y
+    plate_reach: float = 0.5  # m
+    turning_cube: float = 0.0  # N m
     air_added_mass: float = 0.0  # kg
     exciter_rotor: float = 0.0  # kg
     cable_mass: float = 0.0  # kg/m
@@ -100,6 +103,9 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.DAMPING] = effects.hinge_damping
     physics[block + place.FRICTION] = effects.hinge_friction
     physics[block + place.DRAG_AREA] = effects.air_drag
+    physics[block + place.PLATES : block + place.PLATES + 2] = effects.air_plates
+    physics[block + place.PLATE_REACH] = effects.plate_reach
+    physics[block + place.TURNING_CUBE] = effects.turning_cube
     physics[block + place.ADDED_MASS] = effects.air_added_mass
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
     physics[block + place.LINEAR_DENSITY] = effects.cable_mass
