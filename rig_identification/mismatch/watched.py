@@ -113,7 +113,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
     candidates += physics_of_pendulums(rig, mass)
     answer = damped(raw, parts, evaluation, candidates, notify)
-    if answer is None:
+    if answer is None or not answer[0].effects:
         return None
     choice, problem, parted = answer
     notify("weighing each channel by its residual", 0.65)
