@@ -186,26 +186,33 @@ def pendulum(length: float = 1.5, apart: float = 0.5) -> Rig:
     return Rig(9.80665, cables, 1.1, 0.002, noise=noise, tolerance=dict(DEFAULT_TOLERANCE))
 
 
+ELEMENTS_OF_IT = np.array([1.1, 0.01, 0.0, -0.08, 0.05, 0.0, 0.0, 0.04, 0.0, 0.075])
 #: A cradle of half a metre in the air, and how its turn softens: about what the real one shows.
 SIDES, CUBE = 0.6, -0.17
 
 
+def turned(y: float, yaw: float) -> Posed:
+    return Posed(np.array([0.01, y, -1.49]), Rotation.from_rotvec([0.0, 0.0, yaw]).as_quat())
+
+
+def watched(
+    runs: tuple[RunSpec, ...], seed: int, effects: dict[str, tuple[float, ...]] | None = None
+) -> Identification:
+    """What is told of a simulated pendulum that motion capture alone watches."""
+    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0)
+    spec = SessionSpec("bifilar", pendulum(), ELEMENTS_OF_IT, runs, rates=rates, effects=effects or {})
+    return identify(simulate_session(spec, np.random.default_rng(seed))[0])
+
+
 @pytest.fixture(scope="module")
 def in_the_air() -> Identification:
-    """The same, with air at its sides and a turn that softens, both concealed."""
-    elements = np.array([1.1, 0.01, 0.0, -0.08, 0.05, 0.0, 0.0, 0.04, 0.0, 0.075])
-    turned, less = (
-        Posed(np.array([0.01, y, -1.49]), Rotation.from_rotvec([0.0, 0.0, yaw]).as_quat())
-        for y, yaw in ((0.02, 0.3), (-0.01, 0.2))
+    """Air at its sides and a turn that softens, both concealed."""
+    runs = (
+        RunSpec("run_1", 30.0, turned(0.02, 0.3)),
+        RunSpec("run_2", 20.0, turned(-0.01, 0.2), holdout=True),
     )
-    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0)
-    runs = (RunSpec("run_1", 30.0, turned), RunSpec("run_2", 20.0, less, holdout=True))
     effects = {"air_plates": (SIDES, 0.0), "air_plates.reach": (0.25,), "turning_cube": (CUBE,)}
-    session, _ = simulate_session(
-        SessionSpec("bifilar", pendulum(), elements, runs, rates=rates, effects=effects),
-        np.random.default_rng(5),
-    )
-    return identify(session)
+    return watched(runs, 5, effects)
 
 
 def test_air_and_a_softening_turn_are_told_apart_by_how_they_die(in_the_air: Identification) -> None:
@@ -225,14 +232,9 @@ def test_air_and_a_softening_turn_are_told_apart_by_how_they_die(in_the_air: Ide
 @pytest.fixture(scope="module")
 def simulated() -> tuple[Identification, np.ndarray]:
     """Turned by 0.3 rad and let go, nothing concealed."""
-    elements = np.array([1.1, 0.01, 0.0, -0.08, 0.05, 0.0, 0.0, 0.04, 0.0, 0.075])
-    turned = Posed(np.array([0.01, 0.02, -1.49]), Rotation.from_rotvec([0.0, 0.0, 0.3]).as_quat())
-    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0)
-    runs = (RunSpec("run_1", 20.0, turned), RunSpec("run_2", 12.0, turned, holdout=True))
-    session, truth = simulate_session(
-        SessionSpec("bifilar", pendulum(), elements, runs, rates=rates), np.random.default_rng(3)
-    )
-    return identify(session), truth.elements
+    start = turned(0.02, 0.3)
+    runs = (RunSpec("run_1", 20.0, start), RunSpec("run_2", 12.0, start, holdout=True))
+    return watched(runs, 3), ELEMENTS_OF_IT
 
 
 def test_simulated_pendulum_gives_its_vertical_inertia(simulated: tuple[Identification, np.ndarray]) -> None:

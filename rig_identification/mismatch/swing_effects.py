@@ -186,11 +186,10 @@ def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: C
     index = np.concatenate([rest, np.array(mine, dtype=rest.dtype)])
     covariance = invert_information(full.information[np.ix_(index, index)])
     best = point.theta[mine] + (covariance @ full.gradient[index])[rest.size :]
-    place = {i: k for k, i in enumerate(mine)}
     kept = best_subset(
         best,
         covariance[rest.size :, rest.size :],
-        [[place[i] for i in group] for group in groups],
+        [[mine.index(i) for i in group] for group in groups],
         [c.positive > 0 for c in candidates],
         [needed_gain(c, len(candidates)) for c in candidates],
     )

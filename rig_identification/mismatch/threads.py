@@ -44,7 +44,7 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
             positive=1,
             name_in_result="damping",
         ),
-        *(_plates(rig, block, size, k) for k in range(2)),
+        *(_plates(block, size, k) for k in range(2)),
         Candidate(
             "unknown",
             (
@@ -69,7 +69,7 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
     return out if line is None else [*out, _rolling(rig, mass, size, line)]
 
 
-def _plates(rig: Rig, block: int, size: float, face: int) -> Candidate:
+def _plates(block: int, size: float, face: int) -> Candidate:
     """Air against the sides of a body that face along x (``face`` 0) or y, at the hinges' distance."""
     axis, reach = "xy"[face], 0.5 * size
     plates = added(f"air.plates_{axis}", "m^2", 3.0 * size**2, block + place.PLATES + face)

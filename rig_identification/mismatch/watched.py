@@ -122,7 +122,8 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     heavy, point = _begun_whole(ideal, *careful)
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
     fitted = _scored(ideal, heavy, whole, converged)
-    found = [Trial(c, heavy, whole, log_evidence(whole), True) for c in choice.effects]
+    evidence_of_all = log_evidence(whole)
+    found = [Trial(c, heavy, whole, evidence_of_all, True) for c in choice.effects]
     after, verdict = judged(fitted)
     values = {p.name: p.value for p in parameter_estimates(fitted.problem, fitted.evaluation)}
     stds = {p.name: p.std for p in parameter_estimates(fitted.problem, careful[1])}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numba import njit
 
-from rig_identification.model.arithmetic import reciprocal
+from rig_identification.model.effects.center import center_of_mass
 from rig_identification.model.effects.place import ADDED_MASS, active
 from rig_identification.model.effects.point_mass import add_point_inertia
-from rig_identification.model.layout import INERTIAL, RATE
+from rig_identification.model.layout import RATE
 
 
 @njit(cache=True)
@@ -16,10 +16,5 @@ def add_air_added_mass(physics, block, x, K, r):  # type: ignore[no-untyped-def]
     mass = physics[block + ADDED_MASS]
     if not active(mass):
         return
-    per_mass = reciprocal(physics[INERTIAL])
-    cx, cy, cz = (
-        physics[INERTIAL + 1] * per_mass,
-        physics[INERTIAL + 2] * per_mass,
-        physics[INERTIAL + 3] * per_mass,
-    )
+    cx, cy, cz = center_of_mass(physics)
     add_point_inertia(mass, cx, cy, cz, x[RATE], x[RATE + 1], x[RATE + 2], K, r)

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from numba import njit
 
-from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.arithmetic import root
 from rig_identification.model.effects.air_drag import AIR
+from rig_identification.model.effects.center import center_of_mass, velocity_of
 from rig_identification.model.effects.place import PLATE_REACH, PLATES, active
-from rig_identification.model.layout import INERTIAL, RATE, VELOCITY
+from rig_identification.model.layout import RATE
 
 
 @njit(cache=True)
@@ -25,16 +26,9 @@ def add_air_plates(physics, block, x, R, r):  # type: ignore[no-untyped-def]
     if not (active(facing_x) or active(facing_y)):
         return
     reach = physics[block + PLATE_REACH]
-    per_mass = reciprocal(physics[INERTIAL])
-    cx, cy, cz = (
-        physics[INERTIAL + 1] * per_mass,
-        physics[INERTIAL + 2] * per_mass,
-        physics[INERTIAL + 3] * per_mass,
-    )
-    wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
-    v0, v1, v2 = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
-    vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2 + wy * cz - wz * cy
-    vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2 + wz * cx - wx * cz
+    cx, cy, cz = center_of_mass(physics)
+    vx, vy, _ = velocity_of(x, R, cx, cy, cz)
+    wz = x[RATE + 2]
     for side in (-reach, reach):
         # 1e-12 m^2/s^2 keeps the root's derivative finite at rest
         u = vx - wz * side
