@@ -19,7 +19,9 @@ _OF_DEVICE = {
     "clock": "clock_offset",
 }
 #: Switches that belong to an effect of another name.
-_OF_SWITCH = {"cable_damping_ratio": "cable_elasticity", "tether_point": "tether"}
+_OF_SWITCH = {"cable_damping_ratio": "cable_elasticity"} | dict.fromkeys(
+    ("tether_point", "tether_pull", "tether_reach"), "tether"
+)
 
 
 def effects_given(texts: Iterable[str]) -> dict[str, tuple[float, ...]]:

@@ -390,6 +390,7 @@ def solve(
     polish: float = 0.0,
     bends: bool = False,
     notify: Callable[[int, float], None] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> tuple[Evaluation, bool]:
     """Minimise from ``point``: (last evaluation, whether it converged).
 
@@ -400,7 +401,8 @@ def solve(
     next ones are tried without derivatives first, and where ``bends`` bent along their valley. Steps that
     win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
-    A plateau, where nothing fits and nothing answers any more, does not count.
+    A plateau, where nothing fits and nothing answers any more, does not count. Where ``stop`` says so the fit
+    ends after the step that it is at, unconverged.
     """
     current = evaluate(problem, point)
     if current is None:
@@ -450,6 +452,8 @@ def solve(
                 return current, _as_good_as_settled(problem, current)
         if notify is not None:
             notify(iteration, current.cost)
+        if stop is not None and stop():
+            break
     return current, False
 
 

@@ -82,6 +82,8 @@ class PlantEffects:
     axial_damping_ratio: float = 0.0  # of the body's bounce on its cables
     tether: Array = field(default_factory=lambda: np.zeros(3))  # N/m, world axes
     tether_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
+    tether_pull: Array = field(default_factory=lambda: np.zeros(3))  # N, world axes
+    tether_reach: Array = field(default_factory=lambda: np.zeros(3))  # m, world; 0: a spring on each axis
     exciter_gain: float = 0.0  # 0.01: the true force is 1 % above the measured one
     cable_length: Array = field(default_factory=lambda: np.zeros(1))  # m that cables are longer, each or all
     ceiling_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, world: hinges' errors
@@ -95,7 +97,7 @@ class PlantEffects:
 def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     """The same rig with ``effects``.
 
-    A tether is slack, and a rider's spring bears its weight, where the rig hangs at rest without these.
+    A tether pulls as told, and a rider's spring bears its weight, where the rig hangs at rest without these.
     """
     elastic = _elastic(model, effects)
     physics = _with_rig_errors(elastic, effects)
@@ -116,6 +118,8 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     )
     physics[block + place.TETHER_STIFFNESS : block + place.TETHER_STIFFNESS + 3] = effects.tether
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = effects.tether_point
+    physics[block + place.TETHER_PULL : block + place.TETHER_PULL + 3] = effects.tether_pull
+    physics[block + place.TETHER_REACH : block + place.TETHER_REACH + 3] = effects.tether_reach
     out = elastic.with_physics(physics)
     for rider in effects.riders:
         out = out.with_internal(rider.blocks(rest.R_world_body))

@@ -1,17 +1,18 @@
-"""How long a search may take: past it nothing new is begun, and what is found so far is told."""
+"""How long an answer may take: past it nothing new is begun, what is begun ends, what is found is told."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
 
-#: Seconds after which a search begins no further effect, and fits nothing more that changes the model.
+#: Seconds after which no further effect is begun, and no hypothesis fitted any further. What comes after,
+#: whole runs with what was found and a stand-in for what was not, takes up to a minute.
 SECONDS = 120.0
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Time of a search, from when it is made."""
+    """Time of an answer, from when it is made."""
 
     seconds: float = SECONDS
     begun: float = field(default_factory=time.monotonic)
@@ -19,4 +20,8 @@ class Budget:
     @property
     def spent(self) -> bool:
         """Whether the time is over."""
+        return self.over()
+
+    def over(self) -> bool:
+        """The same, to be asked by a fit between its steps."""
         return time.monotonic() - self.begun > self.seconds

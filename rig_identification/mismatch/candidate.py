@@ -31,6 +31,9 @@ class Candidate:
     build: Build | None = None  # where the effect changes more than numbers
     #: Start states, or a body, that suit the changed model, from a fit without it
     settle: Callable[[Problem, Point, Evaluation], Point] | None = None
+    #: From a fit with it: closer descriptions of the same effect that first order cannot tell from it, and
+    #: where their fits start
+    closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
     experiment: str = ""  # what would tell it from its rivals
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 

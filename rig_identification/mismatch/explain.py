@@ -7,6 +7,7 @@ from functools import partial
 
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
 from rig_identification.mismatch.left_over import unexplained
@@ -20,27 +21,28 @@ from rig_identification.mismatch.trial import mass_of
 Notify = Callable[[str, float], None]
 
 
-def explain(ideal: Ideal, spells: list[Spell], notify: Notify) -> Explained | None:
+def explain(ideal: Ideal, spells: list[Spell], notify: Notify, budget: Budget) -> Explained | None:
     """Search for what the ideal model leaves out; None where every residual is noise.
 
     Near the noise the search looks at whole runs, which say most; where the ideal model fails by
     far, at short pieces, in which no model is far off. spells: in which a cable carries nothing (slack.py).
+    budget: how long it may take.
     """
     if ideal.mismatch.verdict == "none":
-        return _hidden(ideal, notify)
+        return _hidden(ideal, notify, budget)
     if not spells:
-        return _explain(ideal, notify)
+        return _explain(ideal, notify, budget)
     notify("search: stretches in which every cable pulls", 0.02)
     taut = taut_ideal(ideal, spells, notify)
     if taut is None:
         return slack_alone(ideal, spells)
     if not near_noise(taut.fitted):
         taut = with_pieces(taut, notify)
-    found = _explain(taut, notify)
+    found = _explain(taut, notify, budget)
     return with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
 
 
-def _hidden(ideal: Ideal, notify: Notify) -> Explained | None:
+def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     """What no residual shows by itself, and a hypothesis that knows what to look for does.
 
     A score test of all hypotheses at once: one among ever so many that gains more than chance does is fitted,
@@ -53,12 +55,12 @@ def _hidden(ideal: Ideal, notify: Notify) -> Explained | None:
     promises = screen(problem, fitted.evaluation, candidates, mass_of(problem, fitted.evaluation))
     if not worth_a_fit(promises, count_of(candidates)):
         return None
-    search = Search(problem, problem, fitted.evaluation, excess(fitted.evaluation), screened=promises)
+    search = Search(problem, problem, fitted.evaluation, excess(fitted.evaluation), budget, screened=promises)
     best = named(ideal, search, notify)
     return best if best is not None and best.mismatch.verdict == "explained" and not best.trace else None
 
 
-def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
+def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     """The search, on runs in which every cable pulls."""
     if ideal.mismatch.verdict == "none":
         return None
@@ -67,15 +69,15 @@ def _explain(ideal: Ideal, notify: Notify) -> Explained | None:
     here, evaluation = short_pieces(ideal) or (problem, evaluate(problem, fitted.evaluation.point))
     if evaluation is None:
         return None
-    search = Search(problem, here, evaluation, excess(evaluation))
+    search = Search(problem, here, evaluation, excess(evaluation), budget)
     pushed = None if search.whole else without_push(ideal, problem, here, evaluation, notify)
     if pushed is not None:
         return pushed
-    beside = None if search.whole else _beside_push(ideal, here, evaluation, notify)
+    beside = None if search.whole else _beside_push(ideal, here, evaluation, notify, budget)
     if beside is not None:
         return beside
     near = search.whole
-    best = named(ideal, search, notify, partial(_beside_push, ideal, notify=notify))
+    best = named(ideal, search, notify, partial(_beside_push, ideal, notify=notify, budget=budget))
     if best is not None and best.mismatch.verdict == "explained":
         return best
     if near:
@@ -92,12 +94,14 @@ def _gentle_push(ideal: Ideal, problem: Problem, notify: Notify) -> Explained | 
     return None if evaluation is None else without_push(ideal, problem, here, evaluation, notify)
 
 
-def _beside_push(ideal: Ideal, here: Problem, evaluation: Evaluation, notify: Notify) -> Explained | None:
+def _beside_push(
+    ideal: Ideal, here: Problem, evaluation: Evaluation, notify: Notify, budget: Budget
+) -> Explained | None:
     """What explains the session outside a push; None where nothing pushes, or nothing explains the rest."""
     event = push_beside(here, evaluation, notify)
     if event is None:
         return None
-    found = _explain(outside(ideal, event, notify), notify)
+    found = _explain(outside(ideal, event, notify), notify, budget)
     if found is None or found.mismatch.verdict != "explained":
         return None
     return with_push(found, ideal, here, event)

@@ -22,6 +22,7 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.without_frame import subtract_frame
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
@@ -83,6 +84,7 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
     def fitting(stage: str, fraction: float) -> None:
         notify(stage, IDEAL_SHARE * fraction)
 
+    budget = Budget()
     fitted = fit_session(session, fitting, assumed)
     ideal = Ideal(fitted, *judged(fitted))
     spells = spells_of(fitted)
@@ -105,7 +107,7 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
-            found = explain(ideal, spells, searching)
+            found = explain(ideal, spells, searching, budget)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
     if found is None:

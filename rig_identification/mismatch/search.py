@@ -96,6 +96,12 @@ def _almost(trial: Trial, before: Evaluation) -> bool:
     return not _at_noise(trial) and excess(trial.evaluation) < ALMOST * excess(before)
 
 
+def _coarse(trial: Trial, before: Evaluation) -> bool:
+    """Whether a hypothesis takes the larger part of what was left away, and has a closer description."""
+    chief = excess(trial.evaluation) < (1.0 - CHIEF) * excess(before)
+    return chief and trial.candidate.closer is not None and not _at_noise(trial)
+
+
 @dataclass(frozen=True)
 class Trials:
     """Hypotheses fitted in full, most likely first, and the device that contradicts all others."""
@@ -136,7 +142,7 @@ def trials(
         tried = begun(here, seen, _worth_it(promises, count, seen, far), far, notify, budget)
     device, needed = None, log_evidence(seen) + MEANT
     if far and more and not any(_at_noise(t) for t in tried):
-        lead = leading(tried, seen, candidates, mass, notify)
+        lead = leading(tried, seen, candidates, mass, notify, budget)
         if lead is not None:
             return Trials([lead])
     if far and not any(_at_noise(t) for t in tried):
@@ -185,17 +191,28 @@ def trials(
         if len(done) == FINISHED or ((last or (done and budget.spent)) and not trial.settled):
             continue
         notify(trial.candidate.label)
-        ended = finished(trial)
+        ended = finished(trial, budget)
         if ended is None or not beyond_doubt(ended, ordinary, limit):
             continue
         ended = fair(ended)
         if ended.evidence > needed:
-            (beaten if last else done).append(ended)
+            place = beaten if last else done
+            # Two descriptions may have the same closer one
+            same = next((t for t in place if t.candidate.label == ended.candidate.label), None)
+            if same is None:
+                place.append(ended)
+            elif ended.evidence > same.evidence:
+                place[place.index(same)] = ended
     return Trials(told_apart(done, MEANT), device, tuple(beaten))
 
 
 def leading(
-    tried: list[Trial], before: Evaluation, candidates: list[Candidate], mass: float, notify: Notify
+    tried: list[Trial],
+    before: Evaluation,
+    candidates: list[Candidate],
+    mass: float,
+    notify: Notify,
+    budget: Budget,
 ) -> Trial | None:
     """The hypothesis with which, and with one more, nothing is left; None where there is none.
 
@@ -210,7 +227,7 @@ def leading(
         if best is not None and trial.candidate.build is not None:
             # What changes the model and is fitted slowly may bend to anything
             break
-        first = finished(trial)
+        first = finished(trial, budget)
         if first is None:
             continue
         notify(f"{first.candidate.label}, and one more")
@@ -219,7 +236,7 @@ def leading(
         for promise in worth_a_fit(promises, count_of(others))[:FURTHER]:
             if promise.share < DIRECT or promise.candidate.build is not None:
                 continue
-            second = attempt(first.problem, first.evaluation, promise)
+            second = attempt(first.problem, first.evaluation, promise, budget)
             if second is None or not _at_noise(second):
                 continue
             if best is None or second.evidence > best[0]:
@@ -290,10 +307,10 @@ def begun(
             # Another one left next to nothing, and much more was expected of it
             continue
         notify(promise.candidate.label)
-        trial = attempt(problem, evaluation, promise)
-        if trial is not None and far and _almost(trial, evaluation):
+        trial = attempt(problem, evaluation, promise, budget)
+        if trial is not None and far and (_almost(trial, evaluation) or _coarse(trial, evaluation)):
             # Worth its last steps before any other is tried
-            trial = finished(trial) or trial
+            trial = finished(trial, budget) or trial
             nearly = max(nearly, promise.gain)
         if trial is not None:
             out.append(trial)

@@ -26,12 +26,12 @@ class Search:
     here: Problem  # what hypotheses are tried on: short pieces where much is left, whole runs near the noise
     evaluation: Evaluation
     start: float  # excess in short pieces before anything was found
+    budget: Budget
     share: float = 0.0  # of that excess that the effects found take away
     found: list[Trial] = field(default_factory=list)
     rivals: list[dict[str, object]] = field(default_factory=list)
     liar: str | None = None
     screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
-    budget: Budget = field(default_factory=Budget)
 
     @property
     def whole(self) -> bool:

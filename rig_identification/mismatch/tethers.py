@@ -2,17 +2,23 @@
 
 To first order a tether of stiffness k along d at the place p of the body puts the force -k d d^T (u + t x p)
 there, u and t being the body's travel and turn: a polynomial of second degree in p (places.py).
+
+What is taut turns with the body and does not push: past where it hangs free first order ends, and what pulls
+there half of the time passes for something softer that pulls all the time. What first order finds is tried
+with a wall on either side (model/effects/tether.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
@@ -34,10 +40,16 @@ from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Length (m) of a hose that pulls as hard as any would and resists sideways most.
-SHORT_HOSE = 1.0
+#: Pull, as a share of the weight, up to which a hose is believed of, and the length (m) of one that pulls as
+#: hard as that and resists sideways most.
+PULL, SHORT_HOSE = 0.02, 1.0
+ADVICE = "Let cables and hoses hang free in a long loop, or take them off."
 #: Places lie within so much of the rig's longest side about the middle.
 REACH = 0.6
+#: Length (m) of a hose that is known no better, and the std of its logarithm.
+HOSE, HOSE_SPREAD = 1.5, 0.7
+#: Std by which a pull has to be more than what comes off it for a hose to be certainly taut all the time.
+CERTAIN = 3.0
 #: Gain (nats) of a tether's stiffness beyond its pull: what pulls steadily alone is no tether.
 STIFF = 3.0
 
@@ -53,54 +65,133 @@ def _middle(rig: Rig) -> Array:
     return np.asarray(np.mean(points, axis=0) - [0.0, 0.0, 0.3 * float(np.max(extent(rig)))])
 
 
+def _amounts(axes: str, rig: Rig, mass: float) -> tuple[Parameter, ...]:
+    """Stiffnesses along ``axes``, then pulls."""
+    block = layout.effects_offset(len(rig.cables))
+    length = float(np.mean([c.length for c in rig.cables]))
+    return tuple(
+        added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
+        for what, unit, std, entry in (
+            ("stiffness", "N/m", 0.2 * mass * rig.gravity / length, place.TETHER_STIFFNESS),
+            ("pull", "N", PULL * mass * rig.gravity, place.TETHER_PULL),
+        )
+        for a in axes
+    )
+
+
+def _point(rig: Rig) -> tuple[Parameter, ...]:
+    """The point of the body that is pulled at."""
+    entry = layout.effects_offset(len(rig.cables)) + place.TETHER_POINT
+    size, middle = float(np.max(extent(rig))), _middle(rig)
+    return tuple(
+        added(f"tether.point.{a}", "m", size, entry + i, float(middle[i])) for i, a in enumerate(AXES)
+    )
+
+
+def _told(axes: str, values: dict[str, float], stds: dict[str, float]) -> Told:
+    """A tether along ``axes`` as the contract names it."""
+
+    def of(name: str, unit: str) -> tuple[float, float, str]:
+        return values[f"tether.{name}"], stds[f"tether.{name}"], unit
+
+    stiff = {a: of(f"stiffness.{a}", "N/m") for a in axes}
+    out: Told = {"stiffness": max(stiff.values(), key=lambda told: abs(told[0]))}
+    if len(axes) == 1:
+        pull, std, unit = of(f"pull.{axes}", "N")
+        out["preload"] = (abs(pull), std, unit)
+    else:
+        out |= {f"stiffness_{a}": told for a, told in stiff.items()}
+        out |= {f"pull_{a}": of(f"pull.{a}", "N") for a in axes}
+    return out | {f"point_{a}": of(f"point.{a}", "m") for a in AXES}
+
+
 def _tether(axes: str, rig: Rig, mass: float) -> Candidate:
     """A tether that pulls along ``axes``: along one as a taut hose does, along all as one that hangs.
 
     What is taut resists sideways as well, by its pull over its length F0/l alike to both sides: too little to
     show by itself, and enough to stand for a centre of mass that lies millimetres higher.
     """
-    block = layout.effects_offset(len(rig.cables))
-    length = float(np.mean([c.length for c in rig.cables]))
-    spring, pull = 0.2 * mass * rig.gravity / length, 0.02 * mass * rig.gravity
-    size, middle = float(np.max(extent(rig))), _middle(rig)
-    parts = [
-        added(f"tether.{what}.{a}", unit, std, block + entry + AXES.index(a))
-        for what, unit, std, entry in (
-            ("stiffness", "N/m", spring, place.TETHER_STIFFNESS),
-            ("pull", "N", pull, place.TETHER_PULL),
-        )
-        for a in axes
-    ]
+    parts = _amounts(axes, rig, mass)
     if len(axes) == 1:
-        first, second = (block + place.TETHER_STIFFNESS + i for i, a in enumerate(AXES) if a != axes)
-        aside = added("tether.sideways", "N/m", pull / SHORT_HOSE, first)
-        parts.append(replace(aside, also=(second,)))
-    parts += [
-        added(f"tether.point.{a}", "m", size, block + place.TETHER_POINT + i, float(middle[i]))
-        for i, a in enumerate(AXES)
-    ]
-
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        stiff = {a: values[f"tether.stiffness.{a}"] for a in axes}
-        main = max(stiff, key=lambda a: abs(stiff[a]))
-        out: Told = {"stiffness": (stiff[main], stds[f"tether.stiffness.{main}"], "N/m")}
-        for p in parts:
-            _, what, *a = p.name.split(".")
-            if what == "point" or len(axes) > 1:
-                out["_".join([what, *a])] = (values[p.name], stds[p.name], p.unit)
-            elif what == "pull":
-                out["preload"] = (abs(values[p.name]), stds[p.name], p.unit)
-        return out
-
+        entry = layout.effects_offset(len(rig.cables)) + place.TETHER_STIFFNESS
+        first, second = (entry + i for i, a in enumerate(AXES) if a != axes)
+        aside = added("tether.sideways", "N/m", PULL * mass * rig.gravity / SHORT_HOSE, first)
+        parts = (*parts, replace(aside, also=(second,)))
     return Candidate(
         "tether",
-        tuple(parts),
+        (*parts, *_point(rig)),
         "A hose or wire pulls on the body with a stiffness of {value}.",
-        "Let cables and hoses hang free in a long loop, or take them off.",
+        ADVICE,
         {"channel": None, "axis": axes if len(axes) == 1 else None},
         positive=len(axes),
-        tell=told,
+        tell=partial(_told, axes),
+        closer=partial(_hoses, mass),
     )
+
+
+def _hose(axis: str, side: float, rig: Rig, mass: float) -> Candidate:
+    """A taut hose to a wall on the ``side`` (-1 or 1) of an axis."""
+    stiffness, pull = _amounts(axis, rig, mass)
+    entry = layout.effects_offset(len(rig.cables)) + place.TETHER_REACH + AXES.index(axis)
+    reach = replace(added(f"tether.reach.{axis}", "m", HOSE_SPREAD, entry, side * HOSE), ratio=True)
+    return Candidate(
+        "tether",
+        (stiffness, pull, reach, *_point(rig)),
+        "A taut hose or wire pulls on the body with a stiffness of {value}; it hangs free while the body "
+        "swings towards its other end.",
+        ADVICE,
+        {"channel": None, "axis": axis},
+        positive=1,
+        tell=partial(_told, axis),
+    )
+
+
+def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:
+    """Hoses to a wall on either side, or on the one that a pull tells which never comes off.
+
+    They run along the axis on which that spring is stiffest. mass: kg, roughly.
+    """
+    parameters, theta = problem.bench.parameters, evaluation.point.theta
+    physics = parameters.physics(theta)
+    block = layout.effects_offset(parameters.model.cables)
+    stiffnesses = physics[block + place.TETHER_STIFFNESS :][:3]
+    along = int(np.argmax(stiffnesses))
+    axis, stiffness = AXES[along], float(stiffnesses[along])
+    if stiffness <= 0.0:
+        return []
+    at = physics[block + place.TETHER_POINT :][:3]
+    travel = np.concatenate([_travel(problem, run.motion, at)[:, along] for run in evaluation.runs])
+    let_go = stiffness * float(np.max(np.abs(travel)))
+    # A pull that never comes off is where the fit of the spring stands, and leads nowhere
+    pulls = {1.0: 0.5 * let_go, -1.0: -0.5 * let_go}
+    pull = next((q for q in parameters.free if q.name == f"tether.pull.{axis}"), None)
+    if pull is not None:
+        column = parameters.index_of(pull.name)
+        std = pull.prior_std * float(np.sqrt(invert_information(evaluation.information)[column, column]))
+        fitted = pull.value(theta[column])
+        if abs(fitted) - CERTAIN * std > let_go:
+            # Taut all the time: it only turns with the body
+            pulls = {float(np.sign(fitted)): fitted}
+    known = {f"tether.stiffness.{axis}": stiffness} | {
+        f"tether.point.{a}": float(value) for a, value in zip(AXES, at, strict=True)
+    }
+    return [
+        (
+            _hose(axis, side, problem.bench.rig, mass),
+            known | {f"tether.pull.{axis}": start, f"tether.reach.{axis}": side * HOSE},
+        )
+        for side, start in pulls.items()
+    ]
+
+
+def _travel(problem: Problem, motion: Motion, at: Array) -> Array:
+    """(N, 3) m: how far the body's point ``at`` is from where it hangs at rest, along world axes."""
+    model = problem.bench.parameters.model
+    block = layout.effects_offset(model.cables)
+    home = model.physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3]
+    turn = model.physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9]
+    origin = motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
+    return np.asarray(origin - home + (motion.R_world_body - turn.reshape(3, 3)) @ at)
 
 
 def placed_tethers(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +21,15 @@ from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, model_at
 from rig_identification.estimate.solve import HOPELESS, POLISH, Evaluation, Point, Problem, evaluate, solve
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
+#: Whether a fit is to end after the step that it is at.
+Stop = Callable[[], bool]
 
 #: Std by which one of several numbers may lie on the wrong side of zero by chance.
 ABSURD = 3.0
@@ -109,18 +113,24 @@ def _left(found: tuple[Linearised, State]) -> float:
     return float(found[0].residual @ found[0].residual)
 
 
-def attempt(problem: Problem, evaluation: Evaluation, promise: Promise) -> Trial | None:
-    """A first, short fit of one hypothesis from what screening promised; None where it cannot start."""
+def attempt(
+    problem: Problem, evaluation: Evaluation, promise: Promise, budget: Budget | None = None
+) -> Trial | None:
+    """A first, short fit of one hypothesis from what screening promised; None where it cannot start.
+
+    It ends where the ``budget`` is spent.
+    """
+    stop = None if budget is None else budget.over
     candidate = promise.candidate
     wide = extended(problem, (candidate,))
     begun = carried(wide, problem, evaluation.point)
     point = promised(wide, begun, candidate, promise.values, evaluation)
     try:
         if candidate.build is not None:
-            point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE)
-            fitted, settled = _first_steps(wide, point, CHANGED_STEPS, candidate)
+            point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE, stop)
+            fitted, settled = _first_steps(wide, point, CHANGED_STEPS, candidate, stop)
         else:
-            fitted, settled = _from_promise(wide, point, begun, candidate)
+            fitted, settled = _from_promise(wide, point, begun, candidate, stop)
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
@@ -131,12 +141,15 @@ def _bends(candidate: Candidate) -> bool:
     return candidate.effect != "loose_mass"
 
 
-def _first_steps(problem: Problem, point: Point, steps: int, candidate: Candidate) -> tuple[Evaluation, bool]:
-    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=_bends(candidate))
+def _first_steps(
+    problem: Problem, point: Point, steps: int, candidate: Candidate, stop: Stop | None
+) -> tuple[Evaluation, bool]:
+    bends = _bends(candidate)
+    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=bends, stop=stop)
 
 
 def _from_promise(
-    problem: Problem, promised: Point, begun: Point, candidate: Candidate
+    problem: Problem, promised: Point, begun: Point, candidate: Candidate, stop: Stop | None
 ) -> tuple[Evaluation, bool]:
     """First steps of a fit that does not change the model.
 
@@ -147,13 +160,13 @@ def _from_promise(
     """
     there, here = (evaluate(problem, p, residuals_only=True) for p in (promised, begun))
     if there is None:
-        return _first_steps(problem, begun, FIRST_STEPS, candidate)
+        return _first_steps(problem, begun, FIRST_STEPS, candidate, stop)
     if here is None or there.cost <= here.cost:
-        return _first_steps(problem, promised, FIRST_STEPS, candidate)
-    fitted, settled = _first_steps(problem, promised, RETURNING_STEPS, candidate)
+        return _first_steps(problem, promised, FIRST_STEPS, candidate, stop)
+    fitted, settled = _first_steps(problem, promised, RETURNING_STEPS, candidate, stop)
     if fitted.cost > here.cost:
-        return _first_steps(problem, begun, FIRST_STEPS, candidate)
-    return (fitted, settled) if settled else _first_steps(problem, fitted.point, FIRST_STEPS, candidate)
+        return _first_steps(problem, begun, FIRST_STEPS, candidate, stop)
+    return (fitted, settled) if settled else _first_steps(problem, fitted.point, FIRST_STEPS, candidate, stop)
 
 
 def promised(
@@ -173,7 +186,7 @@ def promised(
     return point if candidate.settle is None else candidate.settle(problem, point, evaluation)
 
 
-def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool) -> Point:
+def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool, stop: Stop | None) -> Point:
     """The point from where a fit of a changed model to all of its runs starts.
 
     A changed model throws the start states out first, and its amount comes before its other ratios. Where
@@ -188,7 +201,9 @@ def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool) -> P
         point = replace(point, starts=settled_starts(part, point))
         if end == HORIZONS[0]:
             point = _with_amount(part, candidate, point)
-        fitted, _ = solve(part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, bends=True)
+        fitted, _ = solve(
+            part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, bends=True, stop=stop
+        )
         point = fitted.point
     return replace(point, starts=settled_starts(problem, point))
 
@@ -211,8 +226,12 @@ def _with_amount(problem: Problem, candidate: Candidate, point: Point) -> Point:
     return carried(problem, narrow, fitted.point)
 
 
-def finished(trial: Trial) -> Trial | None:
-    """The trial fitted to its end; None where its sign makes no sense there."""
+def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
+    """The trial fitted to its end, as its closest description has it; None where its sign makes no sense.
+
+    Where the ``budget`` is spent it stays where it is.
+    """
+    stop = None if budget is None else budget.over
     if not trial.settled:
         fitted, _ = solve(
             trial.problem,
@@ -221,11 +240,43 @@ def finished(trial: Trial) -> Trial | None:
             tolerance=0.05,
             polish=POLISH,
             bends=_bends(trial.candidate),
+            stop=stop,
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
-    if any(z < (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial)):
+    if not _sensible(trial):
         return None
-    return trial
+    if trial.candidate.closer is None:
+        return trial
+    closer = (
+        _described(trial, candidate, values, stop)
+        for candidate, values in trial.candidate.closer(trial.problem, trial.evaluation)
+    )
+    best = max((trial, *(t for t in closer if t is not None and _sensible(t))), key=lambda t: t.evidence)
+    return replace(best, candidate=replace(best.candidate, closer=None))
+
+
+def _sensible(trial: Trial) -> bool:
+    """Whether what cannot be negative is not."""
+    return all(z >= (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial))
+
+
+def _described(
+    trial: Trial, candidate: Candidate, values: dict[str, float], stop: Stop | None
+) -> Trial | None:
+    """The trial with another description of its effect, started at ``values`` and fitted to its end."""
+    problem = trial.problem
+    instead = {q.name for q in trial.candidate.parameters}
+    parameters = problem.bench.parameters
+    parameters = replace(parameters, free=tuple(q for q in parameters.free if q.name not in instead))
+    wide = extended(replace(problem, bench=replace(problem.bench, parameters=parameters)), (candidate,))
+    point = promised(
+        wide, carried(wide, problem, trial.evaluation.point), candidate, values, trial.evaluation
+    )
+    try:
+        fitted, _ = solve(wide, point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH, stop=stop)
+    except FloatingPointError:
+        return None
+    return Trial(candidate, wide, fitted, log_evidence(fitted), True)
 
 
 def signs(trial: Trial) -> list[float]:

@@ -31,7 +31,8 @@ ROLL_SKEW = 36  # tangent of the angle about the vertical between ROLL_AXIS and 
 PLATE_REACH = 37  # m, a constant of the session
 SHARING = 38  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
 CREEP = 39  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
-EFFECTS_SIZE = 40
+TETHER_REACH = 40  # 3: m, world: from the body's point at rest to the wall; all 0: a spring on each axis
+EFFECTS_SIZE = 43
 
 
 def effects_block(cables: int) -> int:

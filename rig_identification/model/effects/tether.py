@@ -1,11 +1,17 @@
 """A hose or wire pulls: a spring between a point of the body and the room.
 
-F = F0 - k (q - q0) in world axes, axis by axis, q being the point on the body and q0 where it hangs
-at rest (a constant of the session); F0 is the pull at rest.
+Loose in a loop, or held from both sides, it is a spring along each world axis: F = F0 - K (q - q0), q being
+the point on the body, q0 where it hangs at rest (a constant of the session), F0 the pull at rest.
+
+Taut, it runs from q to a point w = q0 + c of the room, c being its reach: F = T (w - q)/l with l = |w - q|
+and T = max(0, T0 + k (l - |c|)). It turns with the body, resists sideways by T/l, and what pulls does not
+push: a body that swings towards the wall by more than T0/k hangs free there. T0 and k are what F0 and K
+have along c.
 """
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from rig_identification.model.effects.place import (
@@ -13,6 +19,7 @@ from rig_identification.model.effects.place import (
     REFERENCE_ROTATION,
     TETHER_POINT,
     TETHER_PULL,
+    TETHER_REACH,
     TETHER_STIFFNESS,
     active,
 )
@@ -28,23 +35,44 @@ def add_tether(physics, block, x, R, r):  # type: ignore[no-untyped-def]
         return
     a = block + TETHER_POINT
     ax, ay, az = physics[a], physics[a + 1], physics[a + 2]
-    fx, fy, fz = 0.0 * ax, 0.0 * ax, 0.0 * ax
-    for i in range(3):
-        t = block + REFERENCE_ROTATION + 3 * i
-        here = x[i] + R[i, 0] * ax + R[i, 1] * ay + R[i, 2] * az
-        rest = (
-            physics[block + REFERENCE_POSITION + i]
-            + physics[t] * ax
-            + physics[t + 1] * ay
-            + physics[t + 2] * az
-        )
-        f = physics[block + TETHER_PULL + i] - physics[block + TETHER_STIFFNESS + i] * (here - rest)
-        fx += R[i, 0] * f
-        fy += R[i, 1] * f
-        fz += R[i, 2] * f
+    ux, uy, uz = (
+        _travel(physics, block, x, R, 0),
+        _travel(physics, block, x, R, 1),
+        _travel(physics, block, x, R, 2),
+    )
+    c, k, p = block + TETHER_REACH, block + TETHER_STIFFNESS, block + TETHER_PULL
+    cx, cy, cz = physics[c], physics[c + 1], physics[c + 2]
+    reach = np.sqrt(cx * cx + cy * cy + cz * cz)
+    if reach.real == 0.0:
+        wx = physics[p] - physics[k] * ux
+        wy = physics[p + 1] - physics[k + 1] * uy
+        wz = physics[p + 2] - physics[k + 2] * uz
+    else:
+        sx, sy, sz = cx / reach, cy / reach, cz / reach
+        stiffness = physics[k] * sx * sx + physics[k + 1] * sy * sy + physics[k + 2] * sz * sz
+        pull = physics[p] * sx + physics[p + 1] * sy + physics[p + 2] * sz
+        dx, dy, dz = cx - ux, cy - uy, cz - uz
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        tension = pull + stiffness * (length - reach)
+        if tension.real <= 0.0:
+            return
+        wx, wy, wz = tension * dx / length, tension * dy / length, tension * dz / length
+    fx = R[0, 0] * wx + R[1, 0] * wy + R[2, 0] * wz
+    fy = R[0, 1] * wx + R[1, 1] * wy + R[2, 1] * wz
+    fz = R[0, 2] * wx + R[1, 2] * wy + R[2, 2] * wz
     r[0] += fx
     r[1] += fy
     r[2] += fz
     r[3] += ay * fz - az * fy
     r[4] += az * fx - ax * fz
     r[5] += ax * fy - ay * fx
+
+
+@njit(cache=True, inline="always")
+def _travel(physics, block, x, R, i):  # type: ignore[no-untyped-def]
+    """How far the body's point is from where it hangs at rest, along world axis i."""
+    a, t = block + TETHER_POINT, block + REFERENCE_ROTATION + 3 * i
+    moved = x[i] - physics[block + REFERENCE_POSITION + i]
+    for j in range(3):
+        moved += (R[i, j] - physics[t + j]) * physics[a + j]
+    return moved
