@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +18,13 @@ from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
 
 
-def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fitted:
-    """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``; predict the held-out runs."""
+def fit_whole(
+    ideal: Fitted, whole: Problem, parts: Problem, point: Point, stop: Callable[[], bool] | None = None
+) -> Fitted:
+    """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``; predict the held-out runs.
+
+    stop: whether to end unconverged.
+    """
     guess = (*point.rest_guesses, *point.starts)[0]
     rest = find_rest(model_at(whole.bench.parameters, point.theta), guess).state
     begun = {
@@ -30,7 +36,7 @@ def fit_whole(ideal: Fitted, whole: Problem, parts: Problem, point: Point) -> Fi
     )
     begin = Point(point.theta, starts, point.rest_guesses)
     bends = whole.bench.parameters.model.internal > 0
-    evaluation, converged = solve(whole, begin, iterations=20, polish=POLISH, bends=bends)
+    evaluation, converged = solve(whole, begin, iterations=20, polish=POLISH, bends=bends, stop=stop)
     known = (*ideal.holdout_runs, *ideal.lost)
     held_runs, held, lost = predicted(whole, known, evaluation.point.theta, rest)
     return replace(

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 #: Seconds after which no further effect is begun, and no hypothesis fitted any further. What comes after,
 #: whole runs with what was found and a stand-in for what was not, takes up to a minute.
 SECONDS = 120.0
+#: Seconds after which whole runs are fitted no further either: what has not settled by then is not told.
+LATEST = 150.0
 
 
 @dataclass(frozen=True)
@@ -25,3 +27,7 @@ class Budget:
     def over(self) -> bool:
         """The same, to be asked by a fit between its steps."""
         return time.monotonic() - self.begun > self.seconds
+
+    def late(self) -> bool:
+        """Whether what was found has to be told as it is."""
+        return time.monotonic() - self.begun > self.seconds + LATEST - SECONDS

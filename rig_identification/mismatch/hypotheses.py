@@ -37,6 +37,15 @@ def catalogue(problem: Problem) -> list[Candidate]:
     ]
 
 
+def compatible(candidates: list[Candidate], found: list[Candidate]) -> list[Candidate]:
+    """Candidates that can stand beside what was found: no parameter of theirs is in the model already.
+
+    A second hose would write its numbers over the first one's.
+    """
+    taken = {q.name for c in found for q in c.parameters}
+    return [c for c in candidates if not taken & {q.name for q in c.parameters}]
+
+
 def count_of(candidates: list[Candidate]) -> int:
     """How many hypotheses are tried: riders swing in many ways."""
     return len(candidates) + len(SWINGS)

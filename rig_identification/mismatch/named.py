@@ -11,7 +11,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.hypotheses import catalogue, count_of, needed_gain
+from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import (
     AT_NOISE,
@@ -38,7 +38,7 @@ def named(
     for step in range(MOST_EFFECTS):
         if step and search.budget.spent:
             break
-        left = [c for c in candidates if c.label not in {t.candidate.label for t in search.found}]
+        left = compatible(candidates, [t.candidate for t in search.found])
         at = (step + 0.5) / (MOST_EFFECTS + 1)
         tried = trials(
             search.here,
@@ -133,8 +133,7 @@ def _most_promising(
     count = count_of(candidates)
     best: tuple[float, Explained, Search] | None = None
     for found, search in standing:
-        have = {t.candidate.label for t in search.found}
-        others = [c for c in candidates if c.label not in have]
+        others = compatible(candidates, [t.candidate for t in search.found])
         mass = mass_of(search.here, search.evaluation)
         search.screened = screen(search.here, search.evaluation, others, mass)
         gains = [p.gain - needed_gain(p.candidate, count) for p in search.screened]

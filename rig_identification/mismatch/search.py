@@ -18,7 +18,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import count_of, slow, worth_a_fit
+from rig_identification.mismatch.hypotheses import compatible, count_of, slow, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.locate import find_liar
@@ -231,7 +231,7 @@ def leading(
         if first is None:
             continue
         notify(f"{first.candidate.label}, and one more")
-        others = [c for c in candidates if c.label != first.candidate.label]
+        others = compatible(candidates, [first.candidate])
         promises = screen(first.problem, first.evaluation, others, mass)
         for promise in worth_a_fit(promises, count_of(others))[:FURTHER]:
             if promise.share < DIRECT or promise.candidate.build is not None:
