@@ -137,8 +137,8 @@ def _hose(axis: str, side: float, rig: Rig, mass: float) -> Candidate:
     return Candidate(
         "tether",
         (stiffness, pull, reach, *_point(rig)),
-        "A taut hose or wire pulls on the body with a stiffness of {value}; it hangs free while the body "
-        "swings towards its other end.",
+        "A taut hose or wire pulls on the body with a stiffness of {value}; it only pulls, and hangs free "
+        "where the body swings far towards its other end.",
         ADVICE,
         {"channel": None, "axis": axis},
         positive=1,
