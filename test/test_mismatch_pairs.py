@@ -11,6 +11,7 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, still_promised
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.search import leading
@@ -78,7 +79,7 @@ def test_the_effect_that_leaves_the_other_one_plain_leads(two_at_once: tuple[Pro
         return trial
 
     right, wrong = tried("hinge_friction"), tried("hinge_damping")
-    found = leading([wrong, right], evaluation, candidates, mass, lambda stage: None)
+    found = leading([wrong, right], evaluation, candidates, mass, lambda stage: None, Budget())
     assert found is not None
     assert found.candidate.label == "hinge_friction"
-    assert leading([wrong], evaluation, candidates, mass, lambda stage: None) is None
+    assert leading([wrong], evaluation, candidates, mass, lambda stage: None, Budget()) is None
