@@ -69,6 +69,20 @@ def size_of(entry: int) -> float:
     return 1e-3
 
 
+def physics_derivative(model: RigModel, state: State, drive: Input, entry: int, h: float) -> Array:
+    """(N, 18 + n) derivative of the raw outputs by an entry of the physics, from steps of h and h/2."""
+
+    def difference(h: float) -> Array:
+        ends = []
+        for sign in (1.0, -1.0):
+            physics = model.physics.copy()
+            physics[entry] += sign * h
+            ends.append(simulate(model.with_physics(physics), state, drive, substeps=SUBSTEPS))
+        return outputs_difference(*ends, h)
+
+    return richardson(difference, h)
+
+
 def assert_close(exact: Array, numeric: Array, what: str, tolerance: float) -> None:
     """Each output's whole history at once, against the largest derivative in it and its group."""
     groups = [(0, 3), (3, 6), (6, 9), (9, 12), (12, 15), (15, 18), (18, exact.shape[1])]
@@ -83,16 +97,8 @@ def check_physics(model: RigModel, state: State, drive: Input, entries: list[int
     exact = simulate(model, state, drive, directions=directions, substeps=SUBSTEPS)
     assert exact.J is not None
     for k, entry in enumerate(entries):
-
-        def difference(h: float, entry: int = entry) -> Array:
-            ends = []
-            for sign in (1.0, -1.0):
-                physics = model.physics.copy()
-                physics[entry] += sign * h
-                ends.append(simulate(model.with_physics(physics), state, drive, substeps=SUBSTEPS))
-            return outputs_difference(*ends, h)
-
-        assert_close(exact.J[:, :, k], richardson(difference, size_of(entry)), f"physics {entry}", tolerance)
+        numeric = physics_derivative(model, state, drive, entry, size_of(entry))
+        assert_close(exact.J[:, :, k], numeric, f"physics {entry}", tolerance)
 
     def shifted(h: float) -> Array:
         """Stamps late by h: what was stamped t was measured at t - h."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from test_model_conservation import kinetic_and_potential
-from test_model_derivatives import SUBSTEPS, assert_close, drive_of, outputs_difference, richardson
+from test_model_derivatives import SUBSTEPS, assert_close, drive_of, physics_derivative
 from test_model_rigs import Sample, moving, random_sample, thesis_case_14
 from test_simulate_identify import seen_by_the_true_body, shaken
 
@@ -101,16 +101,8 @@ def test_derivatives_of_a_taut_hose() -> None:
     exact = simulate(model, state, drive, directions=np.array(own), substeps=SUBSTEPS)
     assert exact.J is not None
     for k, entry in enumerate(own):
-
-        def difference(h: float, entry: int = entry) -> Array:
-            ends = []
-            for sign in (1.0, -1.0):
-                physics = model.physics.copy()
-                physics[entry] += sign * h
-                ends.append(simulate(model.with_physics(physics), state, drive, substeps=SUBSTEPS))
-            return outputs_difference(*ends, h)
-
-        assert_close(exact.J[:, :, k], richardson(difference, 0.01), str(entry - block), 1e-6)
+        numeric = physics_derivative(model, state, drive, entry, 0.01)
+        assert_close(exact.J[:, :, k], numeric, str(entry - block), 1e-6)
 
 
 def test_a_hose_that_comes_slack_is_told_with_its_own_stiffness_and_pull() -> None:

@@ -19,15 +19,13 @@ class Budget:
     seconds: float = SECONDS
     begun: float = field(default_factory=time.monotonic)
 
-    @property
-    def spent(self) -> bool:
-        """Whether the time is over."""
-        return self.over()
+    def _elapsed(self) -> float:
+        return time.monotonic() - self.begun
 
-    def over(self) -> bool:
-        """The same, to be asked by a fit between its steps."""
-        return time.monotonic() - self.begun > self.seconds
+    def spent(self) -> bool:
+        """Whether the time is over; a hypothesis' fit asks between its steps."""
+        return self._elapsed() > self.seconds
 
     def late(self) -> bool:
-        """Whether what was found has to be told as it is."""
-        return time.monotonic() - self.begun > self.seconds + LATEST - SECONDS
+        """Whether what was found has to be told as it is; a fit of whole runs asks between its steps."""
+        return self._elapsed() > self.seconds + LATEST - SECONDS

@@ -50,7 +50,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         if pieces is not None:
             # What is not told must not take part of the missing wrench away
             here, evaluation = pieces[0], pieces[1] or evaluation
-    if search.budget.spent:
+    if search.budget.spent():
         explanation += f" The search ended after {search.budget.seconds:.0f} s, short of some hypotheses."
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)

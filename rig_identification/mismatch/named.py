@@ -36,7 +36,7 @@ def named(
     best: Explained | None = None
     fallback: Explained | None = None
     for step in range(MOST_EFFECTS):
-        if step and search.budget.spent:
+        if step and search.budget.spent():
             break
         left = compatible(candidates, [t.candidate for t in search.found])
         at = (step + 0.5) / (MOST_EFFECTS + 1)
@@ -85,7 +85,7 @@ def named(
             standing = [(best, search), *others]
             for found, its in standing:
                 its.here, its.evaluation = found.fitted.problem, found.fitted.evaluation
-            if others and step + 1 < MOST_EFFECTS and not search.budget.spent:
+            if others and step + 1 < MOST_EFFECTS and not search.budget.spent():
                 notify("search: which of them one more would explain", at)
                 best, search = _most_promising(standing, candidates)
         elif misfit(best.fitted.evaluation) > WRONG and first.candidate.build is not None:

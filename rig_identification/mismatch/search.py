@@ -188,7 +188,7 @@ def trials(
     beaten: list[Trial] = []
     for trial in tried:
         last = any(_at_noise(t) for t in done) and _beaten(trial, done, tried[0], far)
-        if len(done) == FINISHED or ((last or (done and budget.spent)) and not trial.settled):
+        if len(done) == FINISHED or ((last or (done and budget.spent())) and not trial.settled):
             continue
         notify(trial.candidate.label)
         ended = finished(trial, budget)
@@ -292,7 +292,7 @@ def begun(
         if promise.candidate.build is not None and promise.share < CHIEF and rings:
             # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
             continue
-        if budget.spent and (out or promise.candidate.build is not None):
+        if budget.spent() and (out or promise.candidate.build is not None):
             continue
         if not far and promise.gain < min(CLOSE * kept, kept - BEATEN):
             # Another hypothesis promised much more, near the noise, and kept it

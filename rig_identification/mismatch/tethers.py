@@ -35,7 +35,7 @@ from rig_identification.mismatch.places import (
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.model import layout
 from rig_identification.model.effects import place
-from rig_identification.model.motion import Motion
+from rig_identification.model.motion import Motion, RigModel
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -160,7 +160,9 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
     if stiffness <= 0.0:
         return []
     at = physics[block + place.TETHER_POINT :][:3]
-    travel = np.concatenate([_travel(problem, run.motion, at)[:, along] for run in evaluation.runs])
+    model = parameters.model
+    there = [_travel(model, r.motion, lines(r.motion.outputs.shape[0], at, 0.0)) for r in evaluation.runs]
+    travel = np.concatenate([moved[:, along, 0] for moved in there])
     let_go = stiffness * float(np.max(np.abs(travel)))
     # A pull that never comes off is where the fit of the spring stands, and leads nowhere
     pulls = {1.0: 0.5 * let_go, -1.0: -0.5 * let_go}
@@ -184,14 +186,18 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
     ]
 
 
-def _travel(problem: Problem, motion: Motion, at: Array) -> Array:
-    """(N, 3) m: how far the body's point ``at`` is from where it hangs at rest, along world axes."""
-    model = problem.bench.parameters.model
+def _travel(model: RigModel, motion: Motion, at: Array) -> Array:
+    """(N, 3, 4) m: how far a place of the body is from where it hangs at rest, along world axes.
+
+    at: (N, 3, 4), the place as a polynomial of first degree (places.py).
+    """
     block = layout.effects_offset(model.cables)
-    home = model.physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3]
-    turn = model.physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9]
-    origin = motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
-    return np.asarray(origin - home + (motion.R_world_body - turn.reshape(3, 3)) @ at)
+    home = model.physics[block + place.REFERENCE_POSITION :][:3]
+    turn = model.physics[block + place.REFERENCE_ROTATION :][:9].reshape(3, 3)
+    moved = (motion.R_world_body - turn) @ at
+    moved[..., 0] += motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
+    moved[..., 0] -= home
+    return np.asarray(moved)
 
 
 def placed_tethers(
@@ -243,14 +249,9 @@ def placed_tethers(
 
 def _wrenches(problem: Problem, motion: Motion, middle: Array, spread: float, stds: Array) -> Array:
     """(N, 6, 6 TERMS) wrench of a std of stiffness and of pull along each world axis, by place."""
-    model = problem.bench.parameters.model
-    first = layout.effects_offset(model.cables) + place.REFERENCE_POSITION
-    turn = layout.effects_offset(model.cables) + place.REFERENCE_ROTATION
     R = motion.R_world_body
     at = lines(R.shape[0], middle, spread)
-    moved = (R - model.physics[turn : turn + 9].reshape(3, 3)) @ at
-    moved[..., 0] += motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
-    moved[..., 0] -= model.physics[first : first + 3]
+    moved = _travel(problem.bench.parameters.model, motion, at)
     out: list[Array] = []
     for axis in range(3):
         along = R[:, axis, :, None]

@@ -120,7 +120,7 @@ def attempt(
 
     It ends where the ``budget`` is spent.
     """
-    stop = None if budget is None else budget.over
+    stop = None if budget is None else budget.spent
     candidate = promise.candidate
     wide = extended(problem, (candidate,))
     begun = carried(wide, problem, evaluation.point)
@@ -231,7 +231,7 @@ def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
 
     Where the ``budget`` is spent it stays where it is.
     """
-    stop = None if budget is None else budget.over
+    stop = None if budget is None else budget.spent
     if not trial.settled:
         fitted, _ = solve(
             trial.problem,
