@@ -402,7 +402,7 @@ def solve(
     win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count. Where ``stop`` says so the fit
-    ends after the step that it is at, unconverged.
+    ends after the step that it tries, unconverged.
     """
     current = evaluate(problem, point)
     if current is None:
@@ -450,6 +450,8 @@ def solve(
             damping = max(damping, 1e-6) * BRAKED
             if damping > 1e6:
                 return current, _as_good_as_settled(problem, current)
+            if stop is not None and stop():
+                return current, False
         if notify is not None:
             notify(iteration, current.cost)
         if stop is not None and stop():

@@ -62,7 +62,7 @@ def named(
         if misfit(search.evaluation) > EXPLAINED:
             # A push among pieces that all lack something stands out with that in the model
             beside = None
-            if beside_push is not None and not search.whole:
+            if beside_push is not None and not search.whole and not search.budget.spent():
                 beside = beside_push(search.here, search.evaluation)
             if beside is not None:
                 return beside

@@ -232,7 +232,7 @@ def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
     Where the ``budget`` is spent it stays where it is.
     """
     stop = None if budget is None else budget.spent
-    if not trial.settled:
+    if not trial.settled and not (stop is not None and stop()):
         fitted, _ = solve(
             trial.problem,
             trial.evaluation.point,
@@ -245,7 +245,7 @@ def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
     if not _sensible(trial):
         return None
-    if trial.candidate.closer is None:
+    if trial.candidate.closer is None or (stop is not None and stop()):
         return trial
     closer = (
         _described(trial, candidate, values, stop)
