@@ -10,20 +10,30 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.follow import followed
 from rig_identification.estimate.growing import fit_start_growing
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.prediction import Linearised, model_at
-from rig_identification.estimate.solve import POLISH, Point, Problem, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, solve
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
 
+#: Rounds of following what happened and fitting about it.
+FOLLOWED = 4
+
 
 def fit_whole(
-    ideal: Fitted, whole: Problem, parts: Problem, point: Point, stop: Callable[[], bool] | None = None
+    ideal: Fitted,
+    whole: Problem,
+    parts: Problem,
+    point: Point,
+    stop: Callable[[], bool] | None = None,
+    curved: bool = False,
 ) -> Fitted:
     """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``; predict the held-out runs.
 
-    stop: whether to end unconverged.
+    stop: whether to end unconverged. curved: whether the motion may answer so sharply to its noise that the
+    undisturbed one is not what happened.
     """
     guess = (*point.rest_guesses, *point.starts)[0]
     rest = find_rest(model_at(whole.bench.parameters, point.theta), guess).state
@@ -36,7 +46,8 @@ def fit_whole(
     )
     begin = Point(point.theta, starts, point.rest_guesses)
     bends = whole.bench.parameters.model.internal > 0
-    evaluation, converged = solve(whole, begin, iterations=20, polish=POLISH, bends=bends, stop=stop)
+    found = _about_what_happened(whole, begin, stop) if curved else None
+    evaluation, converged = found or solve(whole, begin, iterations=20, polish=POLISH, bends=bends, stop=stop)
     known = (*ideal.holdout_runs, *ideal.lost)
     held_runs, held, lost = predicted(whole, known, evaluation.point.theta, rest)
     return replace(
@@ -48,6 +59,22 @@ def fit_whole(
         holdouts=held,
         lost=lost,
     )
+
+
+def _about_what_happened(
+    whole: Problem, begin: Point, stop: Callable[[], bool] | None
+) -> tuple[Evaluation, bool] | None:
+    """A fit about what happened, followed anew until nothing changes; None where it cannot be followed."""
+    point, found = begin, None
+    for _ in range(FOLLOWED):
+        there = followed(whole, point)
+        if there is None:
+            break
+        found = solve(whole, there, iterations=20, bends=True, stop=stop)
+        point = found[0].point
+        if found[1] or (stop is not None and stop()):
+            break
+    return found
 
 
 def predicted(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
@@ -10,6 +11,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
+from rig_identification.mismatch.lawful import law_trial, lawful_at_last
 from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
@@ -77,10 +79,15 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     if beside is not None:
         return beside
     near = search.whole
-    best = named(ideal, search, notify, partial(_beside_push, ideal, notify=notify, budget=budget))
+    fresh = replace(search, found=[], rivals=[])
+    beside_push = partial(_beside_push, ideal, notify=notify, budget=budget)
+    best = named(ideal, search, notify, beside_push, law_trial)
     if best is not None and best.mismatch.verdict == "explained":
         return best
     if near:
+        law = None if budget.spent() else lawful_at_last(ideal, fresh, notify)
+        if law is not None:
+            return law
         ideal = with_pieces(ideal, notify)
         pushed = _gentle_push(ideal, problem, notify)
         if pushed is not None:

@@ -12,10 +12,12 @@ from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain
+from rig_identification.mismatch.lawful import lawful, lawful_instead
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import (
     AT_NOISE,
     MOST_EFFECTS,
+    Law,
     Trials,
     trials,
 )
@@ -29,9 +31,12 @@ Beside = Callable[[Problem, Evaluation], Explained | None]
 
 
 def named(
-    ideal: Ideal, search: Search, notify: Notify, beside_push: Beside | None = None
+    ideal: Ideal, search: Search, notify: Notify, beside_push: Beside | None = None, law: Law | None = None
 ) -> Explained | None:
-    """Effects of the catalogue, one after the other, until the whole runs are explained."""
+    """Effects of the catalogue, one after the other, until the whole runs are explained.
+
+    law: what may explain all runs where the catalogue's first promises do not; it stands alone or not at all.
+    """
     candidates = catalogue(search.problem)
     best: Explained | None = None
     fallback: Explained | None = None
@@ -49,7 +54,11 @@ def named(
             search.screened,
             search.budget,
             more=step + 1 < MOST_EFFECTS,
+            law=None if step else law,
         )
+        if tried.done and tried.done[0].candidate.effect == "unknown":
+            told = lawful(ideal, search, tried.done[0], notify)
+            return told or named(ideal, search, notify, beside_push)
         search.screened = None
         search.liar = search.liar or tried.liar
         if not tried.done:
@@ -75,6 +84,11 @@ def named(
         best = whole_runs(ideal, search)
         if _wholly(best):
             return pruned(best, search, len(candidates))
+        if law is not None and not step and not before.whole and not search.budget.spent():
+            notify("search: a force that follows one point's motion", at)
+            told = lawful_instead(ideal, before, first, law, notify)
+            if told is not None:
+                return told
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best

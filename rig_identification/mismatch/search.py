@@ -27,6 +27,8 @@ from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, log_evidence, mass_of
 
 Notify = Callable[[str], None]
+#: The law that explains such pieces, of a body of so many kg; None where none does.
+Law = Callable[[Problem, Evaluation, float, Budget], Trial | None]
 
 #: Hypotheses that get to their end.
 FINISHED = 3
@@ -120,6 +122,7 @@ def trials(
     screened: list[Promise] | None = None,
     budget: Budget | None = None,
     more: bool = False,
+    law: Law | None = None,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
@@ -128,6 +131,7 @@ def trials(
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
     tried whatever screening says. screened: promises about this evaluation, where they are known. Where the
     budget is spent nothing more that changes the model is begun. more: another effect may be added after.
+    law: what may explain all where nothing that first order tells of does.
     """
     budget = budget or Budget()
     mass = mass_of(problem, evaluation)
@@ -141,6 +145,11 @@ def trials(
     if not far or (promises and promises[0].share > DIRECT):
         tried = begun(here, seen, _worth_it(promises, count, seen, far), far, notify, budget)
     device, needed = None, log_evidence(seen) + MEANT
+    if far and law is not None and not any(_at_noise(t) for t in tried):
+        notify("a force that follows one point's motion")
+        lawful = law(here, seen, mass, budget)
+        if lawful is not None and lawful.evidence > max((t.evidence for t in tried), default=needed):
+            return Trials([lawful])
     if far and more and not any(_at_noise(t) for t in tried):
         lead = leading(tried, seen, candidates, mass, notify, budget)
         if lead is not None:

@@ -31,7 +31,8 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     """Whole runs with the effects ``found``, from a ``known`` point of the problem ``here``."""
     whole = extended(search.problem, tuple(t.candidate for t in found))
     point = replace(known, theta=carried(whole, here, known).theta)
-    fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late)
+    curved = any(t.candidate.curved for t in found)
+    fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
     # What says most comes first, whatever was found first
     found = sorted(found, key=lambda t: -strength(_at(fitted, t)))
     after, verdict = judged(fitted)

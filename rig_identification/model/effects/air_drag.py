@@ -7,6 +7,7 @@ from numba import njit
 from rig_identification.model.arithmetic import root
 from rig_identification.model.effects.center import center_of_mass, velocity_of
 from rig_identification.model.effects.place import DRAG_AREA, active
+from rig_identification.model.effects.point import force_at
 
 #: Density of air, kg/m^3 (recording contract).
 AIR = 1.2
@@ -22,10 +23,4 @@ def add_air_drag(physics, block, x, R, r):  # type: ignore[no-untyped-def]
     vx, vy, vz = velocity_of(x, R, cx, cy, cz)
     # 1e-12 m^2/s^2 keeps the root's derivative finite at rest
     factor = -0.5 * AIR * area * root(vx * vx + vy * vy + vz * vz + 1e-12)
-    fx, fy, fz = factor * vx, factor * vy, factor * vz
-    r[0] += fx
-    r[1] += fy
-    r[2] += fz
-    r[3] += cy * fz - cz * fy
-    r[4] += cz * fx - cx * fz
-    r[5] += cx * fy - cy * fx
+    force_at(cx, cy, cz, factor * vx, factor * vy, factor * vz, r)

@@ -29,6 +29,7 @@ from rig_identification.model.effects.place import (
     TETHER_POINT,
     active,
 )
+from rig_identification.model.effects.point_law import add_point_law
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.effects.turning_cube import add_turning_cube
 from rig_identification.model.layout import CABLE_SIZE, CABLES
@@ -79,4 +80,5 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     add_gyroscopic_share(physics, block, x, r)
     add_cable_mass(physics, block, modes, x, R, K, r)
     add_tether(physics, block, x, R, r)
+    add_point_law(physics, block, x, R, r)
     add_internal(physics, block, modes, x, R, K, r)

@@ -15,14 +15,13 @@ import numpy as np
 from numba import njit
 
 from rig_identification.model.effects.place import (
-    REFERENCE_POSITION,
-    REFERENCE_ROTATION,
     TETHER_POINT,
     TETHER_PULL,
     TETHER_REACH,
     TETHER_STIFFNESS,
     active,
 )
+from rig_identification.model.effects.point import push_at, travel
 
 
 @njit(cache=True)
@@ -33,13 +32,7 @@ def add_tether(physics, block, x, R, r):  # type: ignore[no-untyped-def]
         on = on or active(physics[block + TETHER_STIFFNESS + i]) or active(physics[block + TETHER_PULL + i])
     if not on:
         return
-    a = block + TETHER_POINT
-    ax, ay, az = physics[a], physics[a + 1], physics[a + 2]
-    ux, uy, uz = (
-        _travel(physics, block, x, R, 0),
-        _travel(physics, block, x, R, 1),
-        _travel(physics, block, x, R, 2),
-    )
+    ux, uy, uz = travel(physics, block, TETHER_POINT, x, R)
     c, k, p = block + TETHER_REACH, block + TETHER_STIFFNESS, block + TETHER_PULL
     cx, cy, cz = physics[c], physics[c + 1], physics[c + 2]
     reach = np.sqrt(cx * cx + cy * cy + cz * cz)
@@ -57,22 +50,4 @@ def add_tether(physics, block, x, R, r):  # type: ignore[no-untyped-def]
         if tension.real <= 0.0:
             return
         wx, wy, wz = tension * dx / length, tension * dy / length, tension * dz / length
-    fx = R[0, 0] * wx + R[1, 0] * wy + R[2, 0] * wz
-    fy = R[0, 1] * wx + R[1, 1] * wy + R[2, 1] * wz
-    fz = R[0, 2] * wx + R[1, 2] * wy + R[2, 2] * wz
-    r[0] += fx
-    r[1] += fy
-    r[2] += fz
-    r[3] += ay * fz - az * fy
-    r[4] += az * fx - ax * fz
-    r[5] += ax * fy - ay * fx
-
-
-@njit(cache=True, inline="always")
-def _travel(physics, block, x, R, i):  # type: ignore[no-untyped-def]
-    """How far the body's point is from where it hangs at rest, along world axis i."""
-    a, t = block + TETHER_POINT, block + REFERENCE_ROTATION + 3 * i
-    moved = x[i] - physics[block + REFERENCE_POSITION + i]
-    for j in range(3):
-        moved += (R[i, j] - physics[t + j]) * physics[a + j]
-    return moved
+    push_at(physics, block + TETHER_POINT, R, wx, wy, wz, r)

@@ -1,0 +1,183 @@
+"""A session that a law of one point's motion explains (point_laws.py), where no entry of the catalogue does.
+
+Where the ideal model fails by far its motion is not the body's, and what a law would do along it tells
+nothing. A random wrench beside the model stands for all that it lacks: with it the model follows what was
+measured, and a law is looked for along that motion, by how much of the random wrench it makes needless. What
+the body's inertia can account for as well is free meanwhile, so that no law stands for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.follow import followed
+from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
+from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.observability import invert_information
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.track import wrench_noise
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.point_laws import LawPromise, law_finding, point_laws, sparser
+from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.search import AT_NOISE, Law, Trials, worst_pieces
+from rig_identification.mismatch.standing import EXPLAINED, Search
+from rig_identification.mismatch.trial import Trial, log_evidence, mass_of, promised
+from rig_identification.mismatch.whole_runs import whole_runs
+
+Array = NDArray[np.float64]
+Notify = Callable[[str, float], None]
+
+#: Std of the random wrench, over a tenth of a second, as a share of the body's weight: at first, and least.
+SHARE, LEAST = 0.05, 1e-4
+#: Ends (s) of the horizons over which a law is fitted where much is left, before the whole pieces.
+HORIZONS = (0.3, 0.6, 1.0, 1.5)
+#: Steps over each of them, and to the end.
+STEPS, LAST_STEPS = 8, 20
+#: Laws that are fitted.
+FITTED = 2
+
+
+def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explained | None:
+    """What explains all runs with a law in the model; None where it does not.
+
+    search: as it stands at the ideal model; it is left as it is.
+    """
+    own = replace(search, found=[], rivals=[], screened=None)
+    own.adopt(Trials([trial]), trial)
+    if misfit(own.evaluation) > EXPLAINED:
+        return None
+    notify("search: whole runs with the law", 0.8)
+    best = whole_runs(ideal, own)
+    if best.mismatch.verdict != "explained":
+        return None
+    finding = law_finding(best.fitted, trial.candidate, best.mismatch.findings[0])
+    return replace(best, mismatch=replace(best.mismatch, findings=(finding,)))
+
+
+def lawful_instead(ideal: Ideal, search: Search, first: Trial, law: Law, notify: Notify) -> Explained | None:
+    """What explains all runs with a law where the ``first`` hypothesis does not; None where nothing does.
+
+    search: as it stood before that hypothesis, which short pieces did not refute.
+    """
+    here, evaluation = worst_pieces(search.here, search.evaluation)
+    trial = law(here, evaluation, mass_of(here, evaluation), search.budget)
+    same = len(first.problem.runs) == len(here.runs)
+    if trial is None or (same and trial.evidence < first.evidence):
+        return None
+    return lawful(ideal, search, trial, notify)
+
+
+def lawful_at_last(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
+    """What explains all runs with a law, where nothing of the catalogue did.
+
+    search: as it stood before the catalogue's turn.
+    """
+    notify("search: a force that follows one point's motion", 0.7)
+    mass = mass_of(search.here, search.evaluation)
+    trial = law_trial(search.here, search.evaluation, mass, search.budget)
+    return None if trial is None else lawful(ideal, search, trial, notify)
+
+
+def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Budget) -> Trial | None:
+    """The likeliest law with no more parts than are seen, fitted; None where none leaves only noise."""
+    followed = _fitting_wrench(problem, evaluation.point, mass)
+    if followed is None:
+        return None
+    noisy, point = followed
+    along = evaluate(noisy, point)
+    if along is None:
+        return None
+    best: Trial | None = None
+    for law in point_laws(noisy, along, mass)[:FITTED]:
+        if budget.spent():
+            break
+        trial = _fitted(problem, evaluation, point, law, budget)
+        if trial is not None and (best is None or trial.evidence > best.evidence):
+            best = trial
+    if best is None or misfit(best.evaluation) > AT_NOISE:
+        return None
+    return _sparse(problem, best, budget)
+
+
+def _fitted(
+    problem: Problem, evaluation: Evaluation, point: Point, law: LawPromise, budget: Budget
+) -> Trial | None:
+    """A law fitted to its end from where the wrench that stood for it left the starts."""
+    candidate = law.promise.candidate
+    wide = extended(problem, (candidate,))
+    # The body as it was: what the motion alone tells of it comes with the law
+    start = carried(wide, problem, replace(point, latents=()))
+    there = promised(wide, start, candidate, law.promise.values, evaluation)
+    try:
+        if misfit(evaluation) > NEAR_SQUARE:
+            for end in HORIZONS:
+                part = held_over(wide, end, there.theta[:INERTIAL].copy())
+                there = replace(there, starts=settled_starts(part, there))
+                there = _solved(part, there, STEPS, budget)[0].point
+        there = replace(there, starts=settled_starts(wide, there))
+        fitted, settled = _solved(wide, there, LAST_STEPS, budget)
+    except FloatingPointError:
+        return None
+    return Trial(candidate, wide, fitted, log_evidence(fitted), settled)
+
+
+def _solved(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple[Evaluation, bool]:
+    return solve(
+        problem, point, iterations=steps, tolerance=0.1, polish=POLISH, bends=True, stop=budget.spent
+    )
+
+
+def _sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
+    """The trial less the parts of its law that are not seen, one after the other."""
+    while True:
+        parameters = trial.problem.bench.parameters
+        spread = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
+        theta = trial.evaluation.point.theta
+        seen = {
+            q.name: float(abs(theta[i]) / spread[i]) for i, q in enumerate(parameters.free, start=INERTIAL)
+        }
+        less: Candidate | None = sparser(trial.candidate, seen)
+        if less is None:
+            return trial
+        wide = extended(problem, (less,))
+        try:
+            fitted, settled = _solved(
+                wide, carried(wide, trial.problem, trial.evaluation.point), LAST_STEPS, budget
+            )
+        except FloatingPointError:
+            return trial
+        trial = Trial(less, wide, fitted, log_evidence(fitted), settled)
+
+
+def _fitting_wrench(problem: Problem, point: Point, mass: float) -> tuple[Problem, Point] | None:
+    """The problem with a random wrench about as strong as what the model lacks; see :func:`with_wrench`."""
+    widest = with_wrench(problem, replace(point, latents=()), mass)
+    if widest is None or widest[0].extra_noise is None:
+        return widest
+    weight = np.diag(widest[0].extra_noise)
+    parts = [latent**2 / weight for latent in widest[1].latents if latent is not None]
+    size = float(np.sqrt(np.mean(np.concatenate(parts))))
+    return with_wrench(problem, widest[1], mass, max(LEAST, SHARE * size))
+
+
+def with_wrench(
+    problem: Problem, point: Point, mass: float, share: float = SHARE
+) -> tuple[Problem, Point] | None:
+    """The problem with a random wrench beside the model, and the point at which it follows what was measured.
+
+    None where a run cannot be followed. mass: kg, roughly. share: std of the wrench over a tenth of a
+    second, in parts of the weight.
+    """
+    rig = problem.bench.rig
+    size, step = float(np.max(extent(rig))), problem.runs[0].grid.step
+    noisy = replace(problem, extra_noise=wrench_noise(mass, rig.gravity, 0.3 * size, step, share))
+    there = followed(noisy, point)
+    return None if there is None else (noisy, there)

@@ -1,0 +1,54 @@
+"""A force at a point of the body that follows the point's motion by a law that no other effect has.
+
+With q the point, u = q - q0 its travel from where it hangs at rest (a constant of the session) and v its
+velocity, all in the world,
+    F = -(k1 s + k2 s^2 + k3 s^3) d - (c1 + c2 |v|) exp(-n |u|^2) v,    s = d . u
+The first part is a spring along the line d that hardens, softens or pushes (a magnet, a bush, a belt); it
+keeps energy, its potential being k1 s^2/2 + k2 s^3/3 + k3 s^4/4. The second is a brake to all sides that may
+fade with distance (an eddy-current brake, a rubbing brush, a sail away from the centre of mass); with c1, c2
+>= 0 it only takes energy out. d = (cos e cos a, cos e sin a, sin e), azimuth a and elevation e.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from rig_identification.model.arithmetic import root
+from rig_identification.model.effects.center import velocity_of
+from rig_identification.model.effects.place import (
+    LAW_BRAKE,
+    LAW_DIRECTION,
+    LAW_NARROW,
+    LAW_POINT,
+    LAW_SPRING,
+    active,
+)
+from rig_identification.model.effects.point import force_at, push_at, travel
+
+
+@njit(cache=True)
+def add_point_law(physics, block, x, R, r):  # type: ignore[no-untyped-def]
+    """Add the law's force to r."""
+    k, c = block + LAW_SPRING, block + LAW_BRAKE
+    springs = active(physics[k]) or active(physics[k + 1]) or active(physics[k + 2])
+    brakes = active(physics[c]) or active(physics[c + 1])
+    if not (springs or brakes):
+        return
+    point = block + LAW_POINT
+    ux, uy, uz = travel(physics, block, LAW_POINT, x, R)
+    if springs:
+        azimuth, elevation = physics[block + LAW_DIRECTION], physics[block + LAW_DIRECTION + 1]
+        level = np.cos(elevation)
+        dx, dy, dz = level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)
+        s = dx * ux + dy * uy + dz * uz
+        force = -(physics[k] + (physics[k + 1] + physics[k + 2] * s) * s) * s
+        push_at(physics, point, R, force * dx, force * dy, force * dz, r)
+    if brakes:
+        bx, by, bz = velocity_of(x, R, physics[point], physics[point + 1], physics[point + 2])
+        # 1e-12 m^2/s^2 keeps the root's derivative finite at rest
+        speed = root(bx * bx + by * by + bz * bz + 1e-12)
+        fade = np.exp(-physics[block + LAW_NARROW] * (ux * ux + uy * uy + uz * uz))
+        factor = -(physics[c] + physics[c + 1] * speed) * fade
+        ax, ay, az = physics[point], physics[point + 1], physics[point + 2]
+        force_at(ax, ay, az, factor * bx, factor * by, factor * bz, r)
