@@ -53,6 +53,7 @@ _WITH_PARTS = frozenset(
         "hinge_position",
         "liquid_slosh",
         "loose_mass",
+        "point_law",
         "sprung_mass",
     )
 )

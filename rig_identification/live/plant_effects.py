@@ -84,6 +84,11 @@ class PlantEffects:
     tether_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
     tether_pull: Array = field(default_factory=lambda: np.zeros(3))  # N, world axes
     tether_reach: Array = field(default_factory=lambda: np.zeros(3))  # m, world; 0: a spring on each axis
+    law_spring: Array = field(default_factory=lambda: np.zeros(3))  # N/m, N/m^2, N/m^3
+    law_brake: Array = field(default_factory=lambda: np.zeros(2))  # N s/m, N s^2/m^2
+    law_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
+    law_line: Array = field(default_factory=lambda: np.zeros(2))  # rad, azimuth and elevation
+    law_narrow: float = 0.0  # 1/m^2
     exciter_gain: float = 0.0  # 0.01: the true force is 1 % above the measured one
     cable_length: Array = field(default_factory=lambda: np.zeros(1))  # m that cables are longer, each or all
     ceiling_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, world: hinges' errors
@@ -120,6 +125,11 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = effects.tether_point
     physics[block + place.TETHER_PULL : block + place.TETHER_PULL + 3] = effects.tether_pull
     physics[block + place.TETHER_REACH : block + place.TETHER_REACH + 3] = effects.tether_reach
+    physics[block + place.LAW_SPRING : block + place.LAW_SPRING + 3] = effects.law_spring
+    physics[block + place.LAW_BRAKE : block + place.LAW_BRAKE + 2] = effects.law_brake
+    physics[block + place.LAW_POINT : block + place.LAW_POINT + 3] = effects.law_point
+    physics[block + place.LAW_DIRECTION : block + place.LAW_DIRECTION + 2] = effects.law_line
+    physics[block + place.LAW_NARROW] = effects.law_narrow
     out = elastic.with_physics(physics)
     for rider in effects.riders:
         out = out.with_internal(rider.blocks(rest.R_world_body))

@@ -41,7 +41,7 @@ SHARE, LEAST = 0.05, 1e-4
 HORIZONS = (0.3, 0.6, 1.0, 1.5)
 #: Steps over each of them, and to the end.
 STEPS, LAST_STEPS = 8, 20
-#: Laws that are fitted.
+#: Laws that are fitted, as long as none leaves only noise.
 FITTED = 2
 
 
@@ -56,7 +56,8 @@ def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explai
         return None
     notify("search: whole runs with the law", 0.8)
     best = whole_runs(ideal, own)
-    if best.mismatch.verdict != "explained":
+    if best.mismatch.verdict != "explained" or best.trace:
+        # A name of the catalogue may leave a trace; what has no name has nothing else to speak for it
         return None
     finding = law_finding(best.fitted, trial.candidate, best.mismatch.findings[0])
     return replace(best, mismatch=replace(best.mismatch, findings=(finding,)))
@@ -97,7 +98,7 @@ def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Bud
         return None
     best: Trial | None = None
     for law in point_laws(noisy, along, mass)[:FITTED]:
-        if budget.spent():
+        if budget.spent() or (best is not None and misfit(best.evaluation) < AT_NOISE):
             break
         trial = _fitted(problem, evaluation, point, law, budget)
         if trial is not None and (best is None or trial.evidence > best.evidence):
@@ -121,7 +122,11 @@ def _fitted(
             for end in HORIZONS:
                 part = held_over(wide, end, there.theta[:INERTIAL].copy())
                 there = replace(there, starts=settled_starts(part, there))
-                there = _solved(part, there, STEPS, budget)[0].point
+                reached = _solved(part, there, STEPS, budget)[0]
+                if end > HORIZONS[0] and misfit(reached) > NEAR_SQUARE:
+                    # What a law does not explain over a second it will not over two
+                    return None
+                there = reached.point
         there = replace(there, starts=settled_starts(wide, there))
         fitted, settled = _solved(wide, there, LAST_STEPS, budget)
     except FloatingPointError:

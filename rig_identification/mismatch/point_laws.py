@@ -353,9 +353,10 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
         f"{WORDS[name]} ({told[name]['value']:.4g} ± {told[name]['std']:.2g} {told[name]['unit']})"
         for name in parts
     )
+    acts = f"along {axis}" if parts[0] in dict(SPRINGS) else "against its motion"
     fades = " and fades with distance from where that point hangs at rest" if "narrow" in told else ""
     text = (
-        f"A force along {axis} at ({', '.join(f'{p:.2f}' for p in at)}) m of the body grows {grows}{fades}: "
+        f"A force {acts} at ({', '.join(f'{p:.2f}' for p in at)}) m of the body grows {grows}{fades}: "
         f"{rms:.3g} N (root mean square), up to {peak:.3g} N. {candidate.advice}"
     )
     where = {**plain.where, "axis": axis, "position": [float(v) for v in at]}

@@ -141,15 +141,24 @@ def trials(
     count = count_of(candidates)
     promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
-    tried: list[Trial] = []
-    if not far or (promises and promises[0].share > DIRECT):
-        tried = begun(here, seen, _worth_it(promises, count, seen, far), far, notify, budget)
     device, needed = None, log_evidence(seen) + MEANT
-    if far and law is not None and not any(_at_noise(t) for t in tried):
+
+    def instead() -> Trial | None:
+        """The law, if it leaves nothing."""
+        if law is None:
+            return None
         notify("a force that follows one point's motion")
         lawful = law(here, seen, mass, budget)
-        if lawful is not None and lawful.evidence > max((t.evidence for t in tried), default=needed):
-            return Trials([lawful])
+        return lawful if lawful is not None and lawful.evidence > needed else None
+
+    tried: list[Trial] = []
+    if not far or (promises and promises[0].share > DIRECT):
+        worthy = _worth_it(promises, count, seen, far)
+        tried = begun(here, seen, worthy, far, notify, budget, instead if far else None)
+    elif (lawful := instead()) is not None:
+        tried = [lawful]
+    if tried and tried[0].candidate.effect == "unknown":
+        return Trials(tried)
     if far and more and not any(_at_noise(t) for t in tried):
         lead = leading(tried, seen, candidates, mass, notify, budget)
         if lead is not None:
@@ -285,8 +294,13 @@ def begun(
     far: bool,
     notify: Notify,
     budget: Budget,
+    instead: Callable[[], Trial | None] | None = None,
 ) -> list[Trial]:
-    """First, short fits of promises. far: much is left, and one that reaches the noise is no chance."""
+    """First, short fits of promises. far: much is left, and one that reaches the noise is no chance.
+
+    instead: what is tried, and is the only one if it is found, where nothing that is fitted soon leaves only
+    noise, before what is fitted slowly.
+    """
     out: list[Trial] = []
     reached, nearly, kept, done, enough = 0.0, 0.0, 0.0, False, False
     rings = gives_way(problem.bench.parameters.model)
@@ -315,6 +329,10 @@ def begun(
         if far and promise.gain < CLOSE * nearly and slow(promise.candidate):
             # Another one left next to nothing, and much more was expected of it
             continue
+        if instead is not None and promise.candidate.build is not None and not any(_at_noise(t) for t in out):
+            found, instead = instead(), None
+            if found is not None:
+                return [found]
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise, budget)
         if trial is not None and far and (_almost(trial, evaluation) or _coarse(trial, evaluation)):
@@ -328,4 +346,7 @@ def begun(
             if far and _at_noise(trial):
                 reached = max(reached, promise.gain)
                 enough = promise is not worthy[0]
+    if instead is not None and not any(_at_noise(t) for t in out):
+        found = instead()
+        return out if found is None else [found]
     return out

@@ -1,0 +1,144 @@
+"""A law of one point's motion: what it keeps, what it takes, its derivatives, and how it is found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from test_model_conservation import kinetic_and_potential
+from test_model_derivatives import SUBSTEPS, assert_close, drive_of, physics_derivative
+from test_model_rigs import Sample, moving, random_sample, thesis_case_14
+from test_simulate_identify import seen_by_the_true_body, shaken
+
+from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.observability import invert_information
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.lawful import law_trial
+from rig_identification.mismatch.trial import mass_of
+from rig_identification.model.effects import place
+from rig_identification.model.motion import Input, Motion, RigModel, simulate
+
+Array = NDArray[np.float64]
+POINT = np.array([0.3, 0.5, -0.4])
+LINE = (0.7, 0.3)
+
+
+def ruled(
+    sample: Sample, model: RigModel, spring: tuple[float, ...], brake: tuple[float, ...], narrow: float = 0.0
+) -> RigModel:
+    """The model with a law about where the sample starts."""
+    physics = model.physics.copy()
+    block = place.effects_block(model.cables)
+    physics[block + place.REFERENCE_POSITION :][:3] = sample.start.position
+    physics[block + place.REFERENCE_ROTATION :][:9] = sample.start.R_world_body.ravel()
+    physics[block + place.LAW_POINT :][:3] = POINT
+    physics[block + place.LAW_SPRING :][:3] = spring
+    physics[block + place.LAW_BRAKE :][:2] = brake
+    physics[block + place.LAW_DIRECTION :][:2] = LINE
+    physics[block + place.LAW_NARROW] = narrow
+    return model.with_physics(physics)
+
+
+def travel(sample: Sample, motion: Motion) -> Array:
+    """(N, 3) m of the point from where it started."""
+    home = sample.start.position + sample.start.R_world_body @ POINT
+    return np.asarray(motion.states[:, :3] + motion.R_world_body @ POINT - home)
+
+
+def test_a_spring_by_any_power_keeps_energy() -> None:
+    sample = thesis_case_14()
+    plain = sample.model(rods=True)
+    spring = (4e3, -6e4, 3e6)
+    motion = simulate(
+        ruled(sample, plain, spring, (0.0, 0.0)), moving(sample, plain, 2), Input.none(1001, 0.01)
+    )
+    kinetic, potential = kinetic_and_potential(plain, motion)
+    azimuth, elevation = LINE
+    along = np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    )
+    s = travel(sample, motion) @ along
+    stored = spring[0] * s**2 / 2.0 + spring[1] * s**3 / 3.0 + spring[2] * s**4 / 4.0
+    assert np.ptp(stored) > 0.03 * np.ptp(kinetic)
+    assert np.ptp(kinetic + potential + stored) < 1e-6 * np.ptp(kinetic)
+
+
+def test_a_brake_takes_the_power_that_it_says() -> None:
+    sample = thesis_case_14()
+    plain = sample.model(rods=True)
+    linear, square, narrow = 80.0, 200.0, 3.0
+    motion = simulate(
+        ruled(sample, plain, (0.0, 0.0, 0.0), (linear, square), narrow),
+        moving(sample, plain, 2),
+        Input.none(1001, 0.01),
+    )
+    kinetic, potential = kinetic_and_potential(plain, motion)
+    energy = kinetic + potential
+    x = motion.states
+    v = x[:, 6:9] + np.einsum("nij,nj->ni", motion.R_world_body, np.cross(x[:, 9:12], POINT))
+    speed = np.linalg.norm(v, axis=1)
+    fade = np.exp(-narrow * np.sum(travel(sample, motion) ** 2, axis=1))
+    power = (linear + square * speed) * speed**2 * fade
+    taken = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * 0.01])
+    assert taken[-1] > 0.03 * np.ptp(kinetic)
+    np.testing.assert_allclose(energy[0] - energy, taken, atol=2e-4 * taken[-1])
+
+
+def test_derivatives_of_a_law() -> None:
+    sample = random_sample(5, 3)
+    plain = sample.model(rods=True)
+    model = ruled(sample, plain, (4e3, -6e4, 3e6), (80.0, 200.0), 3.0)
+    state, drive = moving(sample, plain, 5), drive_of(31, 0.01, 5)
+    block = place.effects_block(model.cables)
+    own = {
+        block + first + i: step
+        for first, count, step in (
+            (place.LAW_SPRING, 3, 1.0),
+            (place.LAW_BRAKE, 2, 0.1),
+            (place.LAW_POINT, 3, 1e-3),
+            (place.LAW_DIRECTION, 2, 1e-3),
+            (place.LAW_NARROW, 1, 1e-2),
+        )
+        for i in range(count)
+    }
+    exact = simulate(model, state, drive, directions=np.array(list(own)), substeps=SUBSTEPS)
+    assert exact.J is not None
+    for k, (entry, step) in enumerate(own.items()):
+        numeric = physics_derivative(model, state, drive, entry, step)
+        assert_close(exact.J[:, :, k], numeric, str(entry - block), 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("effects", "part"),
+    [
+        ({"point_law.spring": (0.0, 0.0, 4e6), "point_law.line": (1.2, 0.0)}, "cubic_stiffness"),
+        ({"point_law.brake": (0.0, 900.0)}, "quadratic_damping"),
+    ],
+    ids=["cubic_spring", "square_brake"],
+)
+def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float, ...]], part: str) -> None:
+    """Of a spring's three parts and a brake's two, and its fading, the one that is there stays."""
+    effects = {**effects, "point_law.position": (0.2, 0.4, -0.3)}
+    spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
+    problem, found = seen_by_the_true_body(spec, 3)
+    before = misfit(found)
+    trial = law_trial(problem, found, mass_of(problem, found), Budget())
+    assert trial is not None
+    assert before > 1.5
+    assert misfit(trial.evaluation) < 1.03
+    parameters = trial.problem.bench.parameters
+    values = dict(
+        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
+    )
+    told = trial.candidate.told(values, dict.fromkeys(values, 0.0))
+    parts = {name for name in told if "stiffness" in name or "damping" in name}
+    assert parts == {part}
+    assert "narrow" not in told
+    column = parameters.index_of(f"unknown.{part}")
+    spread = invert_information(trial.evaluation.information)[column, column]
+    std = parameters.free[column - 10].prior_std * np.sqrt(spread)
+    truth = max(max(v) for n, v in effects.items() if n in ("point_law.spring", "point_law.brake"))
+    assert abs(told[part][0] - truth) < 4.0 * std
+    assert std < 0.2 * truth
