@@ -49,9 +49,7 @@ def test_the_amount_of_stretch_is_found_from_far_off(
     assert trial is not None
     assert misfit(trial.evaluation) < 1.1 < misfit(evaluation)
     parameters = trial.problem.bench.parameters
-    found = dict(
-        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
-    )
+    found = parameters.named(trial.evaluation.point.theta)
     assert found["cable.axial_stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
 
 

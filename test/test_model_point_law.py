@@ -129,9 +129,7 @@ def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float,
     assert before > 1.5
     assert misfit(trial.evaluation) < 1.03
     parameters = trial.problem.bench.parameters
-    values = dict(
-        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
-    )
+    values = parameters.named(trial.evaluation.point.theta)
     told = trial.candidate.told(values, dict.fromkeys(values, 0.0))
     parts = {name for name in told if "stiffness" in name or "damping" in name}
     assert parts == {part}

@@ -123,9 +123,7 @@ def test_a_hose_that_comes_slack_is_told_with_its_own_stiffness_and_pull() -> No
     assert ended is not None
     assert ended.evidence > trial.evidence + 10.0
     parameters = ended.problem.bench.parameters
-    values = dict(
-        zip((p.name for p in parameters.free), parameters.values(ended.evaluation.point.theta), strict=True)
-    )
+    values = parameters.named(ended.evaluation.point.theta)
     told = ended.candidate.told(values, dict.fromkeys(values, 0.0))
     column = parameters.index_of("tether.stiffness.x")
     prior = parameters.free[column - 10].prior_std

@@ -251,7 +251,7 @@ class ParameterSet:
 
     def converted(self, theta: Array, other: ParameterSet) -> Array:
         """The vector in this set of what ``theta`` says in ``other``; what that set lacks is as described."""
-        told = dict(zip((p.name for p in other.free), other.values(theta), strict=True))
+        told = other.named(theta)
         out = np.zeros(self.size)
         out[:INERTIAL] = theta[:INERTIAL]
         for i, p in enumerate(self.free, start=INERTIAL):
@@ -267,6 +267,10 @@ class ParameterSet:
     def values(self, theta: Array) -> Array:
         """Free parameters in their own units."""
         return np.array([p.value(t) for p, t in zip(self.free, theta[INERTIAL:], strict=True)])
+
+    def named(self, theta: Array) -> dict[str, float]:
+        """Free parameters in their own units, by name."""
+        return {p.name: float(v) for p, v in zip(self.free, self.values(theta), strict=True)}
 
     def physics(self, theta: Array) -> Array:
         """The forward model's flat array."""

@@ -173,9 +173,7 @@ def ringing_like(problem: Problem, tried: list[Trial], before: Evaluation, mass:
     if best is None or excess(best.evaluation) > CHIEF * excess(before):
         return []
     parameters = best.problem.bench.parameters
-    values = dict(
-        zip((p.name for p in parameters.free), parameters.values(best.evaluation.point.theta), strict=True)
-    )
+    values = parameters.named(best.evaluation.point.theta)
     frequency = float(values[f"{best.candidate.effect}.frequency"])
     axis = best.candidate.where["axis"]
     gain = before.cost - best.evaluation.cost

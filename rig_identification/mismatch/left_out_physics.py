@@ -126,7 +126,7 @@ def _less_the_rotor(problem: Problem, point: Point, evaluation: Evaluation) -> P
     """The body without the rotor that a fit without one holds in it: together they move as that fit does."""
     _ = evaluation
     parameters = problem.bench.parameters
-    values = dict(zip((p.name for p in parameters.free), parameters.values(point.theta), strict=True))
+    values = parameters.named(point.theta)
     mass, at = values["exciter.rotor_mass"], layout.EXCITER_POSITION
     mount = parameters.physics(point.theta)[at : at + 3]
     rotor = np.array([mass, *(mass * mount), *six_elements(point_inertia(mass, mount))])

@@ -15,6 +15,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.model import layout
+from rig_identification.model.effects import place
+from rig_identification.model.motion import Motion, RigModel
+
 Array = NDArray[np.float64]
 
 #: Places tried along each axis at first, and about the best of them in each of so many finer rounds.
@@ -44,6 +48,25 @@ def crossed(a: Array, b: Array) -> Array:
 def lines(nodes: int, middle: Array, spread: float) -> Array:
     """(nodes, 3, 4) the place itself: ``middle`` and ``spread`` times u."""
     return np.broadcast_to(np.column_stack([middle, spread * np.eye(3)]), (nodes, 3, 4))
+
+
+def travel(model: RigModel, motion: Motion, at: Array) -> Array:
+    """(N, 3, 4) m: how far a place of the body is from where it hangs at rest, along world axes.
+
+    at: (N, 3, 4), the place as :func:`lines` gives it.
+    """
+    block = layout.effects_offset(model.cables)
+    home = model.physics[block + place.REFERENCE_POSITION :][:3]
+    turn = model.physics[block + place.REFERENCE_ROTATION :][:9].reshape(3, 3)
+    moved = (motion.R_world_body - turn) @ at
+    moved[..., 0] += motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
+    moved[..., 0] -= home
+    return np.asarray(moved)
+
+
+def travel_of(model: RigModel, motion: Motion, at: Array) -> Array:
+    """(N, 3) m: the same of one place ``at`` (3,) m."""
+    return np.asarray(travel(model, motion, lines(motion.outputs.shape[0], at, 0.0))[..., 0])
 
 
 def placed_wrench(force: Array, at: Array) -> Array:

@@ -24,6 +24,7 @@ from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate, Told, added
+from rig_identification.mismatch.places import travel_of
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.screen import Promise, free_without
@@ -293,16 +294,14 @@ def _held(wrench: Array) -> Array:
 
 def _followed(model: RigModel, motion: Motion, at: Array) -> tuple[Array, Array]:
     """((N, 3) m, (N, 3) m/s) travel of the body's point ``at`` from where it hangs at rest, and velocity."""
-    block = layout.effects_offset(model.cables)
-    home = model.physics[block + place.REFERENCE_POSITION :][:3]
-    turn = model.physics[block + place.REFERENCE_ROTATION :][:9].reshape(3, 3)
-    x, R = motion.states, motion.R_world_body
-    u = motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3] - home + (R - turn) @ at
+    x = motion.states
     turning = np.cross(x[:, layout.RATE : layout.RATE + 3], at)
-    v = x[:, layout.VELOCITY : layout.VELOCITY + 3] + np.einsum("nij,nj->ni", R, turning)
-    return np.asarray(u), np.asarray(v)
+    v = x[:, layout.VELOCITY : layout.VELOCITY + 3] + np.einsum("nij,nj->ni", motion.R_world_body, turning)
+    return travel_of(model, motion, at), np.asarray(v)
 
 
+#: Std of a point's coordinate, in parts of the rig's longest side, beyond which it is told as any.
+VAGUE = 0.2
 #: Std by which a part of a law has to be seen to stay.
 SEEN = 3.0
 
@@ -329,13 +328,11 @@ def _without(candidate: Candidate, name: str) -> Candidate:
 def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding:
     """The finding of a law in words and numbers: ``plain`` with where, how strong and what it follows."""
     parameters = fitted.problem.bench.parameters
-    values = dict(
-        zip((p.name for p in parameters.free), parameters.values(fitted.evaluation.point.theta), strict=True)
-    )
+    values = parameters.named(fitted.evaluation.point.theta)
     model = model_at(parameters, fitted.evaluation.point.theta)
     at = np.array([values[f"unknown.point.{a}"] for a in AXES])
     forces = [_force(model, run.motion, at) for run in fitted.evaluation.runs]
-    size = np.concatenate([np.linalg.norm(f, axis=1) for f in forces])
+    sizes = np.concatenate([np.linalg.norm(f, axis=1) for f in forces])
     strength = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
     axis = AXES[int(np.argmax(strength))]
     parts = [q.name.removeprefix("unknown.") for q in candidate.parameters]
@@ -343,7 +340,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     told: dict[str, Any] = dict(plain.parameters)
     first = max(parts, key=lambda name: abs(float(told[name]["value"])) / float(told[name]["std"]))
     share = float(told[first]["std"]) / abs(float(told[first]["value"]))
-    rms, peak = float(np.sqrt(np.mean(size**2))), float(np.max(size))
+    rms, peak = float(np.sqrt(np.mean(sizes**2))), float(np.max(sizes))
     told = {first: told.pop(first)} | told
     told |= {
         "force": {"value": rms, "std": share * rms, "unit": "N"},
@@ -355,8 +352,12 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     )
     acts = f"along {axis}" if parts[0] in dict(SPRINGS) else "against its motion"
     fades = " and fades with distance from where that point hangs at rest" if "narrow" in told else ""
+    size = float(np.max(extent(fitted.problem.bench.rig)))
+    # A point slides along its own force's line without a change
+    known = [float(told[f"point_{a}"]["std"]) < VAGUE * size for a in AXES]
+    place_told = ", ".join(f"{p:.2f}" if k else "any" for p, k in zip(at, known, strict=True))
     text = (
-        f"A force {acts} at ({', '.join(f'{p:.2f}' for p in at)}) m of the body grows {grows}{fades}: "
+        f"A force {acts} at ({place_told}) m of the body grows {grows}{fades}: "
         f"{rms:.3g} N (root mean square), up to {peak:.3g} N. {candidate.advice}"
     )
     where = {**plain.where, "axis": axis, "position": [float(v) for v in at]}

@@ -31,11 +31,13 @@ from rig_identification.mismatch.places import (
     lines,
     monomials,
     placed_wrench,
+    travel,
+    travel_of,
 )
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.model import layout
 from rig_identification.model.effects import place
-from rig_identification.model.motion import Motion, RigModel
+from rig_identification.model.motion import Motion
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -161,9 +163,8 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
         return []
     at = physics[block + place.TETHER_POINT :][:3]
     model = parameters.model
-    there = [_travel(model, r.motion, lines(r.motion.outputs.shape[0], at, 0.0)) for r in evaluation.runs]
-    travel = np.concatenate([moved[:, along, 0] for moved in there])
-    let_go = stiffness * float(np.max(np.abs(travel)))
+    moved = np.concatenate([travel_of(model, r.motion, at)[:, along] for r in evaluation.runs])
+    let_go = stiffness * float(np.max(np.abs(moved)))
     # A pull that never comes off is where the fit of the spring stands, and leads nowhere
     pulls = {1.0: 0.5 * let_go, -1.0: -0.5 * let_go}
     pull = next((q for q in parameters.free if q.name == f"tether.pull.{axis}"), None)
@@ -184,20 +185,6 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
         )
         for side, start in pulls.items()
     ]
-
-
-def _travel(model: RigModel, motion: Motion, at: Array) -> Array:
-    """(N, 3, 4) m: how far a place of the body is from where it hangs at rest, along world axes.
-
-    at: (N, 3, 4), the place as a polynomial of first degree (places.py).
-    """
-    block = layout.effects_offset(model.cables)
-    home = model.physics[block + place.REFERENCE_POSITION :][:3]
-    turn = model.physics[block + place.REFERENCE_ROTATION :][:9].reshape(3, 3)
-    moved = (motion.R_world_body - turn) @ at
-    moved[..., 0] += motion.outputs[:, layout.OUT_POSITION : layout.OUT_POSITION + 3]
-    moved[..., 0] -= home
-    return np.asarray(moved)
 
 
 def placed_tethers(
@@ -251,7 +238,7 @@ def _wrenches(problem: Problem, motion: Motion, middle: Array, spread: float, st
     """(N, 6, 6 TERMS) wrench of a std of stiffness and of pull along each world axis, by place."""
     R = motion.R_world_body
     at = lines(R.shape[0], middle, spread)
-    moved = _travel(problem.bench.parameters.model, motion, at)
+    moved = travel(problem.bench.parameters.model, motion, at)
     out: list[Array] = []
     for axis in range(3):
         along = R[:, axis, :, None]

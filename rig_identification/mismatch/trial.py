@@ -292,9 +292,7 @@ def signs(trial: Trial) -> list[float]:
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
     """Whether a freed doubt really lies beyond what is ordinary: an addition always does."""
     parameters = trial.problem.bench.parameters
-    values = dict(
-        zip((p.name for p in parameters.free), parameters.values(trial.evaluation.point.theta), strict=True)
-    )
+    values = parameters.named(trial.evaluation.point.theta)
     freed = [p for p in trial.candidate.parameters if p.name in ordinary]
     if not freed:
         return True
