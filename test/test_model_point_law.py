@@ -113,7 +113,7 @@ def test_derivatives_of_a_law() -> None:
 @pytest.mark.parametrize(
     ("effects", "part"),
     [
-        ({"point_law.spring": (0.0, 0.0, 4e6), "point_law.line": (1.2, 0.0)}, "cubic_stiffness"),
+        ({"point_law.spring": (0.0, 0.0, 1.5e7), "point_law.line": (1.2, 0.0)}, "cubic_stiffness"),
         ({"point_law.brake": (0.0, 900.0)}, "quadratic_damping"),
     ],
     ids=["cubic_spring", "square_brake"],

@@ -25,7 +25,14 @@ from rig_identification.estimate.track import wrench_noise
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.point_laws import LawPromise, law_finding, point_laws, sparser
+from rig_identification.mismatch.point_laws import (
+    SEEN,
+    LawPromise,
+    law_finding,
+    parts_of,
+    point_laws,
+    sparser,
+)
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.search import AT_NOISE, Law, Trials, worst_pieces
 from rig_identification.mismatch.standing import EXPLAINED, Search
@@ -41,8 +48,10 @@ SHARE, LEAST = 0.05, 1e-4
 HORIZONS = (0.3, 0.6, 1.0, 1.5)
 #: Steps over each of them, and to the end.
 STEPS, LAST_STEPS = 8, 20
-#: Laws that are fitted, as long as none leaves only noise.
+#: Laws that are fitted: a line between two that are tried is led to from one of them alone.
 FITTED = 2
+#: Std by which the strongest part of a law has to be seen: twice what one needs to stay.
+CERTAIN = 2.0 * SEEN
 
 
 def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explained | None:
@@ -98,14 +107,17 @@ def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Bud
         return None
     best: Trial | None = None
     for law in point_laws(noisy, along, mass)[:FITTED]:
-        if budget.spent() or (best is not None and misfit(best.evaluation) < AT_NOISE):
+        if budget.spent():
             break
         trial = _fitted(problem, evaluation, point, law, budget)
         if trial is not None and (best is None or trial.evidence > best.evidence):
             best = trial
     if best is None or misfit(best.evaluation) > AT_NOISE:
         return None
-    return _sparse(problem, best, budget)
+    sparse = _sparse(problem, best, budget)
+    seen = _seen(sparse)
+    # What takes away so much and is hardly seen itself stands in for something else
+    return sparse if max(seen[q.name] for q in parts_of(sparse.candidate)) > CERTAIN else None
 
 
 def _fitted(
@@ -140,16 +152,18 @@ def _solved(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple
     )
 
 
+def _seen(trial: Trial) -> dict[str, float]:
+    """Each parameter's distance from zero in its own std, by name."""
+    spread = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
+    away = np.abs(trial.evaluation.point.theta) / spread[: trial.evaluation.point.theta.size]
+    free = trial.problem.bench.parameters.free
+    return {q.name: float(z) for q, z in zip(free, away[INERTIAL:], strict=True)}
+
+
 def _sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
     """The trial less the parts of its law that are not seen, one after the other."""
     while True:
-        parameters = trial.problem.bench.parameters
-        spread = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
-        theta = trial.evaluation.point.theta
-        seen = {
-            q.name: float(abs(theta[i]) / spread[i]) for i, q in enumerate(parameters.free, start=INERTIAL)
-        }
-        less: Candidate | None = sparser(trial.candidate, seen)
+        less: Candidate | None = sparser(trial.candidate, _seen(trial))
         if less is None:
             return trial
         wide = extended(problem, (less,))

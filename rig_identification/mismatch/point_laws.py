@@ -306,6 +306,11 @@ VAGUE = 0.2
 SEEN = 3.0
 
 
+def parts_of(candidate: Candidate) -> list[Parameter]:
+    """The amounts of a law: what a force grows by."""
+    return [q for q in candidate.parameters if q.name.removeprefix("unknown.") in WORDS]
+
+
 def sparser(candidate: Candidate, seen: dict[str, float]) -> Candidate | None:
     """The law less the part that is seen least; None where every one is seen, or it is the last.
 
@@ -314,7 +319,7 @@ def sparser(candidate: Candidate, seen: dict[str, float]) -> Candidate | None:
     """
     if seen.get("unknown.narrow", SEEN) < SEEN:
         return _without(candidate, "unknown.narrow")
-    parts = [q.name for q in candidate.parameters if q.name.removeprefix("unknown.") in WORDS]
+    parts = [q.name for q in parts_of(candidate)]
     least = min(parts, key=lambda name: seen[name])
     if len(parts) == 1 or seen[least] >= SEEN:
         return None
@@ -335,8 +340,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     sizes = np.concatenate([np.linalg.norm(f, axis=1) for f in forces])
     strength = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
     axis = AXES[int(np.argmax(strength))]
-    parts = [q.name.removeprefix("unknown.") for q in candidate.parameters]
-    parts = [name for name in parts if name in WORDS]
+    parts = [q.name.removeprefix("unknown.") for q in parts_of(candidate)]
     told: dict[str, Any] = dict(plain.parameters)
     first = max(parts, key=lambda name: abs(float(told[name]["value"])) / float(told[name]["std"]))
     share = float(told[first]["std"]) / abs(float(told[first]["value"]))
