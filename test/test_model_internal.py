@@ -54,14 +54,7 @@ def ceiling(compliance: float, axis: Array, frequency: float, damping: float = 0
 
 def with_rest(model: RigModel) -> RigModel:
     """The rest pose written where riders look for it."""
-    rest = settle(model, design_pose(model))
-    physics = model.physics.copy()
-    block = layout.effects_offset(model.cables)
-    physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3] = rest.position
-    physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9] = (
-        rest.R_world_body.ravel()
-    )
-    return model.with_physics(physics)
+    return model.referred(settle(model, design_pose(model)))
 
 
 def energy(model: RigModel, motion: Motion) -> Array:

@@ -29,10 +29,8 @@ def ruled(
     sample: Sample, model: RigModel, spring: tuple[float, ...], brake: tuple[float, ...], narrow: float = 0.0
 ) -> RigModel:
     """The model with a law about where the sample starts."""
-    physics = model.physics.copy()
+    physics = model.referred(sample.start).physics
     block = place.effects_block(model.cables)
-    physics[block + place.REFERENCE_POSITION :][:3] = sample.start.position
-    physics[block + place.REFERENCE_ROTATION :][:9] = sample.start.R_world_body.ravel()
     physics[block + place.LAW_POINT :][:3] = POINT
     physics[block + place.LAW_SPRING :][:3] = spring
     physics[block + place.LAW_BRAKE :][:2] = brake

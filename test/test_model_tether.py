@@ -25,10 +25,8 @@ STIFFNESS = 20000.0
 
 def tied(sample: Sample, model: RigModel, stiffness: float, pull: Array, reach: Array) -> RigModel:
     """The model with a tether that pulls by ``pull`` where the sample starts; a spring alike on all axes."""
-    physics = model.physics.copy()
+    physics = model.referred(sample.start).physics
     block = place.effects_block(model.cables)
-    physics[block + place.REFERENCE_POSITION :][:3] = sample.start.position
-    physics[block + place.REFERENCE_ROTATION :][:9] = sample.start.R_world_body.ravel()
     physics[block + place.TETHER_POINT :][:3] = POINT
     physics[block + place.TETHER_STIFFNESS :][:3] = stiffness
     physics[block + place.TETHER_PULL :][:3] = pull

@@ -38,11 +38,8 @@ def having(model: RigModel, **amounts: float) -> RigModel:
 
 def rolling(model: RigModel, start: State, stiffness: float, skew: float = 0.0) -> RigModel:
     """The model with hinges that are without strain at ``start``."""
-    physics = model.physics.copy()
-    block = place.effects_block(model.cables)
-    physics[block + place.REFERENCE_POSITION :][:3] = start.position
-    physics[block + place.REFERENCE_ROTATION :][:9] = start.R_world_body.ravel()
-    physics[block + place.ROLL_AXIS :][:3] = AXIS
+    physics = model.referred(start).physics
+    physics[place.effects_block(model.cables) + place.ROLL_AXIS :][:3] = AXIS
     return having(model.with_physics(physics), ROLL_STIFFNESS=stiffness, ROLL_SKEW=skew)
 
 

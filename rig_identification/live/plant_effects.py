@@ -117,10 +117,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
     physics[block + place.LINEAR_DENSITY] = effects.cable_mass
     rest = _rest(elastic.with_physics(physics))
-    physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3] = rest.position
-    physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9] = (
-        rest.R_world_body.ravel()
-    )
+    physics = elastic.with_physics(physics).referred(rest).physics
     physics[block + place.TETHER_STIFFNESS : block + place.TETHER_STIFFNESS + 3] = effects.tether
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = effects.tether_point
     physics[block + place.TETHER_PULL : block + place.TETHER_PULL + 3] = effects.tether_pull

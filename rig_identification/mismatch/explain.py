@@ -11,7 +11,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
-from rig_identification.mismatch.lawful import law_trial, lawful_at_last
+from rig_identification.mismatch.lawful import law_trial, lawful_instead
 from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
@@ -85,7 +85,10 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     if best is not None and best.mismatch.verdict == "explained":
         return best
     if near:
-        law = None if budget.spent() else lawful_at_last(ideal, fresh, notify)
+        law = None
+        if not budget.spent():
+            notify("search: a force that follows one point's motion", 0.7)
+            law = lawful_instead(ideal, fresh, notify)
         if law is not None:
             return law
         ideal = with_pieces(ideal, notify)

@@ -17,7 +17,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.prediction import Bench, linearise_run, smoothed
 from rig_identification.estimate.start_state import fit_start
-from rig_identification.estimate.track import start_covariance
+from rig_identification.estimate.track import start_covariance, wrench_noise
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -43,8 +43,7 @@ def missing_wrench(bench: Bench, run: Run, theta: Array, rest: State, mass: floa
     """Smooth the missing wrench of one run at parameters ``theta``; None where it cannot be followed."""
     size = float(np.max(extent(bench.rig)))
     step = run.grid.step
-    spread = (SHARE * mass * bench.rig.gravity) ** 2 * AVERAGED / step
-    noise = np.diag([spread] * 3 + [spread * (0.3 * size) ** 2] * 3)
+    noise = wrench_noise(mass, bench.rig.gravity, 0.3 * size, step, SHARE)
     start = launch_state(bench, run, theta, rest, noise)
     found = fit_start(bench, run, theta, start, tolerance=0.1, extra_noise=noise)
     if found is None:

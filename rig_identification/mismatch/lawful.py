@@ -18,7 +18,6 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.follow import followed
 from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.track import wrench_noise
@@ -27,16 +26,15 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.point_laws import (
     SEEN,
-    LawPromise,
     law_finding,
     parts_of,
     point_laws,
     sparser,
 )
-from rig_identification.mismatch.screen import carried, extended
-from rig_identification.mismatch.search import AT_NOISE, Law, Trials, worst_pieces
+from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.search import AT_NOISE, Trials, worst_pieces
 from rig_identification.mismatch.standing import EXPLAINED, Search
-from rig_identification.mismatch.trial import Trial, log_evidence, mass_of, promised
+from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, promised
 from rig_identification.mismatch.whole_runs import whole_runs
 
 Array = NDArray[np.float64]
@@ -72,28 +70,23 @@ def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explai
     return replace(best, mismatch=replace(best.mismatch, findings=(finding,)))
 
 
-def lawful_instead(ideal: Ideal, search: Search, first: Trial, law: Law, notify: Notify) -> Explained | None:
-    """What explains all runs with a law where the ``first`` hypothesis does not; None where nothing does.
+def lawful_instead(
+    ideal: Ideal, search: Search, notify: Notify, first: Trial | None = None
+) -> Explained | None:
+    """What explains all runs with a law where the catalogue did not; None where nothing does.
 
-    search: as it stood before that hypothesis, which short pieces did not refute.
+    search: as it stood before the catalogue's turn. first: hypothesis that short pieces did not refute.
     """
-    here, evaluation = worst_pieces(search.here, search.evaluation)
-    trial = law(here, evaluation, mass_of(here, evaluation), search.budget)
-    same = len(first.problem.runs) == len(here.runs)
-    if trial is None or (same and trial.evidence < first.evidence):
+    here, evaluation = search.here, search.evaluation
+    if not search.whole:
+        here, evaluation = worst_pieces(here, evaluation)
+    trial = law_trial(here, evaluation, mass_of(here, evaluation), search.budget)
+    if trial is None:
+        return None
+    same = first is not None and len(first.problem.runs) == len(here.runs)
+    if first is not None and same and trial.evidence < first.evidence:
         return None
     return lawful(ideal, search, trial, notify)
-
-
-def lawful_at_last(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
-    """What explains all runs with a law, where nothing of the catalogue did.
-
-    search: as it stood before the catalogue's turn.
-    """
-    notify("search: a force that follows one point's motion", 0.7)
-    mass = mass_of(search.here, search.evaluation)
-    trial = law_trial(search.here, search.evaluation, mass, search.budget)
-    return None if trial is None else lawful(ideal, search, trial, notify)
 
 
 def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Budget) -> Trial | None:
@@ -115,20 +108,20 @@ def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Bud
     if best is None or misfit(best.evaluation) > AT_NOISE:
         return None
     sparse = _sparse(problem, best, budget)
-    seen = _seen(sparse)
+    seen = in_stds(sparse)
     # What takes away so much and is hardly seen itself stands in for something else
-    return sparse if max(seen[q.name] for q in parts_of(sparse.candidate)) > CERTAIN else None
+    return sparse if max(abs(seen[q.name]) for q in parts_of(sparse.candidate)) > CERTAIN else None
 
 
 def _fitted(
-    problem: Problem, evaluation: Evaluation, point: Point, law: LawPromise, budget: Budget
+    problem: Problem, evaluation: Evaluation, point: Point, law: Promise, budget: Budget
 ) -> Trial | None:
     """A law fitted to its end from where the wrench that stood for it left the starts."""
-    candidate = law.promise.candidate
+    candidate = law.candidate
     wide = extended(problem, (candidate,))
     # The body as it was: what the motion alone tells of it comes with the law
     start = carried(wide, problem, replace(point, latents=()))
-    there = promised(wide, start, candidate, law.promise.values, evaluation)
+    there = promised(wide, start, candidate, law.values, evaluation)
     try:
         if misfit(evaluation) > NEAR_SQUARE:
             for end in HORIZONS:
@@ -152,18 +145,10 @@ def _solved(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple
     )
 
 
-def _seen(trial: Trial) -> dict[str, float]:
-    """Each parameter's distance from zero in its own std, by name."""
-    spread = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
-    away = np.abs(trial.evaluation.point.theta) / spread[: trial.evaluation.point.theta.size]
-    free = trial.problem.bench.parameters.free
-    return {q.name: float(z) for q, z in zip(free, away[INERTIAL:], strict=True)}
-
-
 def _sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
     """The trial less the parts of its law that are not seen, one after the other."""
     while True:
-        less: Candidate | None = sparser(trial.candidate, _seen(trial))
+        less: Candidate | None = sparser(trial.candidate, in_stds(trial))
         if less is None:
             return trial
         wide = extended(problem, (less,))

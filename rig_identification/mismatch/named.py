@@ -86,7 +86,7 @@ def named(
             return pruned(best, search, len(candidates))
         if law is not None and not step and not before.whole and not search.budget.spent():
             notify("search: a force that follows one point's motion", at)
-            told = lawful_instead(ideal, before, first, law, notify)
+            told = lawful_instead(ideal, before, notify, first)
             if told is not None:
                 return told
         if best.mismatch.verdict == "explained":

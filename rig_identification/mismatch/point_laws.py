@@ -87,15 +87,12 @@ def scales_of(problem: Problem, evaluation: Evaluation, mass: float) -> Scales:
     return Scales(FORCE * mass * rig.gravity, max(travel, 1e-6), max(speed, 1e-6), size)
 
 
-def spring_law(
-    rig: Rig, scales: Scales, line: tuple[float, float], parts: tuple[int, ...] = (0, 1, 2)
-) -> Candidate:
-    """A spring at a point about along ``line`` with ``parts``: powers of displacement less one."""
+def spring_law(rig: Rig, scales: Scales, line: tuple[float, float]) -> Candidate:
+    """A spring at a point about along ``line``, with every part."""
     block = layout.effects_offset(len(rig.cables))
     amounts = tuple(
         added(f"unknown.{name}", unit, scales.force / scales.travel ** (k + 1), block + place.LAW_SPRING + k)
         for k, (name, unit) in enumerate(SPRINGS)
-        if k in parts
     )
     angles = tuple(
         added(f"unknown.{name}", "rad", TURNED, block + place.LAW_DIRECTION + i, line[i])
@@ -104,16 +101,15 @@ def spring_law(
     return _law((*amounts, *angles, *_point(rig, scales)), 0)
 
 
-def brake_law(rig: Rig, scales: Scales, parts: tuple[int, ...] = (0, 1), fades: bool = True) -> Candidate:
-    """A brake at a point with ``parts``: powers of speed less one; ``fades``: with distance."""
+def brake_law(rig: Rig, scales: Scales) -> Candidate:
+    """A brake at a point that may fade with distance, with every part."""
     block = layout.effects_offset(len(rig.cables))
     amounts = tuple(
         added(f"unknown.{name}", unit, scales.force / scales.speed ** (k + 1), block + place.LAW_BRAKE + k)
         for k, (name, unit) in enumerate(BRAKES)
-        if k in parts
     )
     narrow = added("unknown.narrow", "1/m^2", 1.0 / scales.travel**2, block + place.LAW_NARROW)
-    return _law((*amounts, *((narrow,) if fades else ()), *_point(rig, scales)), 1)
+    return _law((*amounts, narrow, *_point(rig, scales)), 1)
 
 
 def _law(parameters: tuple[Parameter, ...], positive: int) -> Candidate:
@@ -163,9 +159,9 @@ class Shape:
         """The law with every part of it."""
         return brake_law(rig, scales) if self.line is None else spring_law(rig, scales, self.line)
 
-    def values(self, at: Array, amounts: Array, rig: Rig, scales: Scales) -> dict[str, float]:
-        """Values of its parameters at the place ``at``. amounts: in units of their std."""
-        own = {q.name: q for q in self.candidate(rig, scales).parameters}
+    def values(self, law: Candidate, at: Array, amounts: Array, scales: Scales) -> dict[str, float]:
+        """Values of a ``law``'s parameters at the place ``at``. amounts: in units of their std."""
+        own = {q.name: q for q in law.parameters}
         known = {f"unknown.point.{a}": float(at[i]) for i, a in enumerate(AXES)}
         if self.line is None:
             known["unknown.narrow"] = self.narrow / scales.travel**2
@@ -175,21 +171,17 @@ class Shape:
         return known | {n: own[n].value(float(z)) for n, z in zip(names, amounts, strict=True)}
 
     def makes_sense(self, amounts: Array) -> bool:
-        """Whether it does not feed a motion: no part of a brake takes energy out where none is positive."""
+        """Whether any part of a brake takes energy out; a spring may have either sign."""
         return self.line is not None or bool(np.any(amounts > 0.0))
 
     def wrenches(self, model: RigModel, motion: Motion, at: Array, scales: Scales) -> Array:
         """(N, 6, parts) wrench about the datum, body axes, of a std of each part at the place ``at``."""
         u, v = _followed(model, motion, at)
         if self.line is not None:
-            d = _direction(*self.line)
-            s = (u @ d)[:, None] / scales.travel
-            force = -scales.force * np.concatenate([s, s**2, s**3], axis=1)[:, None, :] * d[:, None]
+            force = _pulls(u / scales.travel, *self.line)
         else:
-            fade = np.exp(-self.narrow * np.sum(u**2, axis=1) / scales.travel**2)
-            w = v / scales.speed
-            speed = np.linalg.norm(w, axis=1)[:, None]
-            force = -scales.force * fade[:, None, None] * np.stack([w, speed * w], axis=2)
+            force = _brakes(u / scales.travel, v / scales.speed, self.narrow)
+        force = scales.force * force
         body = np.einsum("nji,njc->nic", motion.R_world_body, force)
         return np.concatenate([body, np.cross(at[None, :, None], body, axis=1)], axis=1)
 
@@ -204,12 +196,17 @@ def _direction(azimuth: float, elevation: float) -> Array:
     return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
 
 
-@dataclass(frozen=True)
-class LawPromise:
-    """What a law promises, and the wrench that it makes along each run's motion."""
+def _pulls(u: Array, azimuth: float, elevation: float) -> Array:
+    """(N, 3, 3) force of a unit of each part of a spring at travels ``u`` (N, 3), world."""
+    d = _direction(azimuth, elevation)
+    s = (u @ d)[:, None]
+    return np.asarray(-np.concatenate([s, s**2, s**3], axis=1)[:, None, :] * d[:, None])
 
-    promise: Promise
-    wrenches: tuple[Array, ...]  # (N, 6) a run: N and N m about the datum, body axes, held between nodes
+
+def _brakes(u: Array, v: Array, narrow: float) -> Array:
+    """(N, 3, 2) force of a unit of each part of a brake at travels ``u``, velocities ``v`` (N, 3), world."""
+    fade = np.exp(-narrow * np.sum(u**2, axis=1))[:, None, None]
+    return np.asarray(-fade * np.stack([v, np.linalg.norm(v, axis=1)[:, None] * v], axis=2))
 
 
 @dataclass(frozen=True)
@@ -221,7 +218,7 @@ class _Place:
     amounts: Array  # in units of their std
 
 
-def point_laws(problem: Problem, evaluation: Evaluation, mass: float) -> list[LawPromise]:
+def point_laws(problem: Problem, evaluation: Evaluation, mass: float) -> list[Promise]:
     """What each shape promises at its best place, to first order, best first. mass: kg, roughly."""
     rig, model = problem.bench.rig, problem.bench.parameters.model
     scales = scales_of(problem, evaluation, mass)
@@ -242,11 +239,9 @@ def point_laws(problem: Problem, evaluation: Evaluation, mass: float) -> list[La
     out = []
     for shape, found in best.items():
         candidate = shape.candidate(rig, scales)
-        values = shape.values(found.at, found.amounts, rig, scales)
-        along = [shape.wrenches(model, r.motion, found.at, scales) @ found.amounts for r in evaluation.runs]
-        promise = Promise(candidate, found.gain, values, found.gain / left)
-        out.append(LawPromise(promise, tuple(_held(w) for w in along)))
-    return sorted(out, key=lambda law: -law.promise.gain)
+        values = shape.values(candidate, found.at, found.amounts, scales)
+        out.append(Promise(candidate, found.gain, values, found.gain / left))
+    return sorted(out, key=lambda promise: -promise.gain)
 
 
 def _best_of(
@@ -287,11 +282,6 @@ def _best_of(
     return out
 
 
-def _held(wrench: Array) -> Array:
-    """(N, 6) what is held over the interval after each node of a ``wrench`` (N, 6) at the nodes."""
-    return np.asarray(0.5 * (wrench + np.concatenate([wrench[1:], wrench[-1:]])))
-
-
 def _followed(model: RigModel, motion: Motion, at: Array) -> tuple[Array, Array]:
     """((N, 3) m, (N, 3) m/s) travel of the body's point ``at`` from where it hangs at rest, and velocity."""
     x = motion.states
@@ -314,14 +304,14 @@ def parts_of(candidate: Candidate) -> list[Parameter]:
 def sparser(candidate: Candidate, seen: dict[str, float]) -> Candidate | None:
     """The law less the part that is seen least; None where every one is seen, or it is the last.
 
-    seen: each parameter's distance from zero in its own std, by name. What is not seen of a brake's fading
+    seen: each parameter's position in units of its own std, by name. What is not seen of a brake's fading
     goes first.
     """
-    if seen.get("unknown.narrow", SEEN) < SEEN:
+    if abs(seen.get("unknown.narrow", SEEN)) < SEEN:
         return _without(candidate, "unknown.narrow")
     parts = [q.name for q in parts_of(candidate)]
-    least = min(parts, key=lambda name: seen[name])
-    if len(parts) == 1 or seen[least] >= SEEN:
+    least = min(parts, key=lambda name: abs(seen[name]))
+    if len(parts) == 1 or abs(seen[least]) >= SEEN:
         return None
     return _without(candidate, least)
 
@@ -372,9 +362,5 @@ def _force(model: RigModel, motion: Motion, at: Array) -> Array:
     """(N, 3) N, world: the law's force along a motion."""
     block = layout.effects_offset(model.cables)
     p, (u, v) = model.physics[block:], _followed(model, motion, at)
-    azimuth, elevation = p[place.LAW_DIRECTION : place.LAW_DIRECTION + 2]
-    d = _direction(float(azimuth), float(elevation))
-    k, c, s = p[place.LAW_SPRING :][:3], p[place.LAW_BRAKE :][:2], u @ d
-    pull = -(k[0] * s + k[1] * s**2 + k[2] * s**3)[:, None] * d
-    fade = np.exp(-p[place.LAW_NARROW] * np.sum(u**2, axis=1))
-    return np.asarray(pull - ((c[0] + c[1] * np.linalg.norm(v, axis=1)) * fade)[:, None] * v)
+    pulls = _pulls(u, *p[place.LAW_DIRECTION :][:2]) @ p[place.LAW_SPRING :][:3]
+    return np.asarray(pulls + _brakes(u, v, p[place.LAW_NARROW]) @ p[place.LAW_BRAKE :][:2])

@@ -39,8 +39,6 @@ from rig_identification.mismatch.supports import (
     largest_compliance,
 )
 from rig_identification.mismatch.tethers import placed_tethers
-from rig_identification.model.effects import place
-from rig_identification.model.layout import effects_offset
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -62,13 +60,7 @@ class Promise:
 def with_reference(problem: Problem, rest: State) -> Problem:
     """The problem with the rest pose written where effects that know one look for it."""
     parameters = problem.bench.parameters
-    physics = parameters.model.physics.copy()
-    block = effects_offset(parameters.model.cables)
-    physics[block + place.REFERENCE_POSITION : block + place.REFERENCE_POSITION + 3] = rest.position
-    physics[block + place.REFERENCE_ROTATION : block + place.REFERENCE_ROTATION + 9] = (
-        rest.R_world_body.ravel()
-    )
-    model = parameters.model.with_physics(physics)
+    model = parameters.model.referred(rest)
     return replace(problem, bench=replace(problem.bench, parameters=replace(parameters, model=model)))
 
 

@@ -281,12 +281,18 @@ def _described(
 
 def signs(trial: Trial) -> list[float]:
     """What cannot be negative, in units of its own std."""
-    parameters = trial.problem.bench.parameters
-    index = [parameters.index_of(p.name) for p in trial.candidate.parameters[: trial.candidate.positive]]
-    if not index:
+    positive = trial.candidate.parameters[: trial.candidate.positive]
+    if not positive:
         return []
-    std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))
-    return [float(trial.evaluation.point.theta[i] / std[i]) for i in index]
+    seen = in_stds(trial)
+    return [seen[p.name] for p in positive]
+
+
+def in_stds(trial: Trial) -> dict[str, float]:
+    """Free parameters' positions in units of their own std, by name."""
+    theta, free = trial.evaluation.point.theta, trial.problem.bench.parameters.free
+    std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))[: theta.size]
+    return {p.name: float(z) for p, z in zip(free, (theta / std)[INERTIAL:], strict=True)}
 
 
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:

@@ -32,6 +32,7 @@ from rig_identification.model.arithmetic import reciprocal, root
 from rig_identification.model.effects.all import add_effects
 from rig_identification.model.effects.internal import add_ceiling, ceiling_shift
 from rig_identification.model.effects.place import SHARING
+from rig_identification.model.effects.point import force_at
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
     AXIAL_STIFFNESS,
@@ -234,12 +235,7 @@ def add_exciter(physics, mount, force, r):  # type: ignore[no-untyped-def]
     fy = f1 + t1 + 0.5 * (c * t0 - a * t2)
     fz = f2 + t2 + 0.5 * (a * t1 - b * t0)
     px, py, pz = physics[EXCITER_POSITION], physics[EXCITER_POSITION + 1], physics[EXCITER_POSITION + 2]
-    r[0] += fx
-    r[1] += fy
-    r[2] += fz
-    r[3] += py * fz - pz * fy
-    r[4] += pz * fx - px * fz
-    r[5] += px * fy - py * fx
+    force_at(px, py, pz, fx, fy, fz, r)
 
 
 @njit(cache=True)

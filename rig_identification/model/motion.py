@@ -12,7 +12,14 @@ from rig_identification.model import layout
 from rig_identification.model.body import linear_from_elements
 from rig_identification.model.constraints import project_columns, project_state
 from rig_identification.model.effects.internal import STOP_FREQUENCY
-from rig_identification.model.effects.place import CREEP, EFFECTS_SIZE, SHARING, internal_block
+from rig_identification.model.effects.place import (
+    CREEP,
+    EFFECTS_SIZE,
+    REFERENCE_POSITION,
+    REFERENCE_ROTATION,
+    SHARING,
+    internal_block,
+)
 from rig_identification.model.integrate import propagate
 from rig_identification.rig import Rig
 
@@ -51,6 +58,13 @@ class RigModel:
         added = np.array(blocks, dtype=float)
         added[:, layout.LEADER] += self.internal
         return self.with_physics(np.concatenate([self.physics, added.ravel()]))
+
+    def referred(self, rest: State) -> RigModel:
+        """The same rig with ``rest`` written where effects that know a pose of rest look for it."""
+        physics, block = self.physics.copy(), layout.effects_offset(self.cables)
+        physics[block + REFERENCE_POSITION : block + REFERENCE_POSITION + 3] = rest.position
+        physics[block + REFERENCE_ROTATION : block + REFERENCE_ROTATION + 9] = rest.R_world_body.ravel()
+        return self.with_physics(physics)
 
     def with_physics(self, physics: Array) -> RigModel:
         """The same rig with other numbers."""

@@ -12,6 +12,7 @@ from numba import njit
 
 from rig_identification.model.arithmetic import reciprocal, root
 from rig_identification.model.effects.place import LINEAR_DENSITY, active
+from rig_identification.model.effects.point import force_at
 from rig_identification.model.layout import (
     BODY_POINT,
     CABLE_SIZE,
@@ -58,12 +59,7 @@ def add_cable_mass(physics, block, modes, x, R, K, r):  # type: ignore[no-untype
         qz = 0.5 * gz - (wx * ty - wy * tx) * (1.0 / 3.0)
         along = ex * qx + ey * qy + ez * qz
         fx, fy, fz = mass * (qx - along * ex), mass * (qy - along * ey), mass * (qz - along * ez)
-        r[0] += fx
-        r[1] += fy
-        r[2] += fz
-        r[3] += by * fz - bz * fy
-        r[4] += bz * fx - bx * fz
-        r[5] += bx * fy - by * fx
+        force_at(bx, by, bz, fx, fy, fz, r)
         # Left side: m/3 P (A + alpha x b), columns of A then of alpha
         third = mass * (1.0 / 3.0)
         for j in range(6):

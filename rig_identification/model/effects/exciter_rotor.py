@@ -5,6 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.effects.place import ROTOR_MASS, active
+from rig_identification.model.effects.point import force_at
 from rig_identification.model.effects.point_mass import add_point_inertia
 from rig_identification.model.layout import EXCITER_POSITION, GRAVITY, RATE
 
@@ -21,9 +22,4 @@ def add_exciter_rotor(physics, block, x, R, K, r):  # type: ignore[no-untyped-de
     fx = mass * (R[0, 0] * g0 + R[1, 0] * g1 + R[2, 0] * g2)
     fy = mass * (R[0, 1] * g0 + R[1, 1] * g1 + R[2, 1] * g2)
     fz = mass * (R[0, 2] * g0 + R[1, 2] * g1 + R[2, 2] * g2)
-    r[0] += fx
-    r[1] += fy
-    r[2] += fz
-    r[3] += py * fz - pz * fy
-    r[4] += pz * fx - px * fz
-    r[5] += px * fy - py * fx
+    force_at(px, py, pz, fx, fy, fz, r)
