@@ -31,6 +31,7 @@ class Rider:
     frequency: float  # Hz
     damping_ratio: float
     stop: float = 0.0  # m each way to its stops; 0: none
+    stop_damping: float = 0.0  # damping ratio of its stops
 
     def blocks(self, R_rest: Array) -> Array:
         """(k, INTERNAL_SIZE) numbers of its coordinates (model/layout.py). R_rest: body in world at rest."""
@@ -41,7 +42,8 @@ class Rider:
         out[0, layout.MASS] = self.mass
         out[0, layout.POINT : layout.POINT + 3] = self.position
         out[0, layout.FREQUENCY], out[0, layout.DAMPING_RATIO] = self.frequency, self.damping_ratio
-        out[0, layout.STOP], out[0, layout.PENDULUM] = self.stop, float(hangs)
+        out[0, layout.STOP], out[0, layout.STOP_DAMPING] = self.stop, self.stop_damping
+        out[0, layout.PENDULUM] = float(hangs)
         return out
 
 

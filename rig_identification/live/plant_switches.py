@@ -102,6 +102,7 @@ SWITCHES = (
     Switch("loose_mass.travel", 0.02, "m from the middle to either stop", 1e-4, 10.0, "m"),
     Switch("loose_mass.frequency", 0.2, "Hz of its slow way back to the middle", 0.0, 5.0, "Hz"),
     Switch("loose_mass.damping_ratio", 0.05, "of its slow way back to the middle", 0.0, 2.0),
+    Switch("loose_mass.stop_damping", 0.3, "damping ratio of its stops", 0.0, 2.0),
     Switch("loose_mass.position", _NOWHERE, "m, body frame: middle between the stops", *_PLACE),
     Switch("loose_mass.direction", _X, "body axes: line along which it slides", -1e3, 1e3, "", 3),
     Switch("external_force.peak_force", 0.0, "N at the peak of a push, half a sine", 0.0, 1e6, "N"),
@@ -204,7 +205,9 @@ def _riders(values: Mapping[str, Array], model: RigModel, prefix: str) -> tuple[
             )
         liquid = effect == "liquid_slosh"
         axes = np.zeros((0, 3)) if liquid else _direction(values, effect, prefix)[None]
-        stop = float(values["loose_mass.travel"][0]) if effect == "loose_mass" else 0.0
+        stops = (0.0, 0.0)
+        if effect == "loose_mass":
+            stops = float(values["loose_mass.travel"][0]), float(values["loose_mass.stop_damping"][0])
         frequency, damping = values[f"{effect}.frequency"][0], values[f"{effect}.damping_ratio"][0]
-        riders.append(Rider(mass, position, axes, float(frequency), float(damping), stop))
+        riders.append(Rider(mass, position, axes, float(frequency), float(damping), *stops))
     return tuple(riders)

@@ -198,7 +198,6 @@ def far_promises(
         frequency = next(p.nominal for p in springs.candidate.parameters if p.name == "sprung_mass.frequency")
         axis = AXES.index(str(springs.candidate.where["axis"]))
         out.append(ringing_ceiling(problem, frequency, axis, mass, springs.gain))
-    out += [p for p in promises if p.candidate.effect == "loose_mass"][:1]
     if riders and riders[0].candidate.effect == "sprung_mass":
         # What swings along one axis may swing to all sides
         first = riders[0]

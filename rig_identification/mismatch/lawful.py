@@ -14,16 +14,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.follow import followed
 from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
-from rig_identification.estimate.track import wrench_noise
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.measured import fitting_wrench
 from rig_identification.mismatch.point_laws import (
     SEEN,
     law_finding,
@@ -40,8 +38,6 @@ from rig_identification.mismatch.whole_runs import whole_runs
 Array = NDArray[np.float64]
 Notify = Callable[[str, float], None]
 
-#: Std of the random wrench, over a tenth of a second, as a share of the body's weight: at first, and least.
-SHARE, LEAST = 0.05, 1e-4
 #: Ends (s) of the horizons over which a law is fitted where much is left, before the whole pieces.
 HORIZONS = (0.3, 0.6, 1.0, 1.5)
 #: Steps over each of them, and to the end.
@@ -91,7 +87,7 @@ def lawful_instead(
 
 def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Budget) -> Trial | None:
     """The likeliest law with no more parts than are seen, fitted; None where none leaves only noise."""
-    followed = _fitting_wrench(problem, evaluation.point, mass)
+    followed = fitting_wrench(problem, evaluation.point, mass)
     if followed is None:
         return None
     noisy, point = followed
@@ -159,29 +155,3 @@ def _sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
         except FloatingPointError:
             return trial
         trial = Trial(less, wide, fitted, log_evidence(fitted), settled)
-
-
-def _fitting_wrench(problem: Problem, point: Point, mass: float) -> tuple[Problem, Point] | None:
-    """The problem with a random wrench about as strong as what the model lacks; see :func:`with_wrench`."""
-    widest = with_wrench(problem, replace(point, latents=()), mass)
-    if widest is None or widest[0].extra_noise is None:
-        return widest
-    weight = np.diag(widest[0].extra_noise)
-    parts = [latent**2 / weight for latent in widest[1].latents if latent is not None]
-    size = float(np.sqrt(np.mean(np.concatenate(parts))))
-    return with_wrench(problem, widest[1], mass, max(LEAST, SHARE * size))
-
-
-def with_wrench(
-    problem: Problem, point: Point, mass: float, share: float = SHARE
-) -> tuple[Problem, Point] | None:
-    """The problem with a random wrench beside the model, and the point at which it follows what was measured.
-
-    None where a run cannot be followed. mass: kg, roughly. share: std of the wrench over a tenth of a
-    second, in parts of the weight.
-    """
-    rig = problem.bench.rig
-    size, step = float(np.max(extent(rig))), problem.runs[0].grid.step
-    noisy = replace(problem, extra_noise=wrench_noise(mass, rig.gravity, 0.3 * size, step, share))
-    there = followed(noisy, point)
-    return None if there is None else (noisy, there)

@@ -12,6 +12,7 @@ from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
+from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import unknown_finding
@@ -50,14 +51,38 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         if pieces is not None:
             # What is not told must not take part of the missing wrench away
             here, evaluation = pieces[0], pieces[1] or evaluation
+    loose = _something_loose(ideal, best, search, notify)
+    if loose is not None:
+        kept, fitted = loose
+        explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
     if search.budget.spent():
         explanation += f" The search ended after {search.budget.seconds:.0f} s, short of some hypotheses."
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
     # Far from the noise the cautious fit knows by itself how little it knows
-    loose = hear(ideal.fitted).looseness if near_noise(ideal.fitted) else 1.0
-    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, loose)
+    looseness = hear(ideal.fitted).looseness if near_noise(ideal.fitted) else 1.0
+    return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, looseness)
+
+
+def _something_loose(
+    ideal: Ideal, best: Explained | None, search: Search, notify: Notify
+) -> tuple[tuple[Finding, ...], Fitted] | None:
+    """What is told, and the fit it is told beside, where the session has something loose; None: it has not.
+
+    It is looked for beside the ideal model, and then beside what was found, which may only stand in for it.
+    """
+    bases: list[tuple[tuple[Finding, ...], Fitted]] = [((), ideal.fitted)]
+    if best is not None:
+        bases.append((best.mismatch.findings, best.fitted))
+    for others, fitted in bases:
+        if search.budget.late():
+            break
+        notify("search: something loose", 0.9)
+        found = loose_finding(fitted, ideal.scores.holdout)
+        if found is not None:
+            return (*others, found), fitted
+    return None
 
 
 def _unknown(ideal: Fitted, here: Problem, evaluation: Evaluation, liar: str | None) -> Finding | None:

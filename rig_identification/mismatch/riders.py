@@ -1,4 +1,4 @@
-"""Masses that ride on the body: liquid in a tank, a part on springs, something loose.
+"""Masses that ride on the body: liquid in a tank, a part on springs. What is loose: see loose.py.
 
 Which frequency and direction a rider has is scanned to first order in its mass: a massless
 passenger's travel follows from the fitted motion alone, and the wrench by which a kilogram of it
@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
@@ -23,7 +22,6 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import layout
 from rig_identification.model.effects import place
-from rig_identification.model.effects.internal import STOP_DAMPING, STOP_FREQUENCY
 from rig_identification.model.motion import RigModel
 from rig_identification.rig import Rig
 
@@ -36,33 +34,20 @@ DAMPING = 0.03
 DIRECTIONS = {"x": ("x",), "y": ("y",), "z": ("z",), "xy": ("x", "y")}
 
 
-#: What is loose slides between stops this far (m) to either side, held by next to nothing (Hz) and slowed
-#: like a toolbox on a carpet (1/s).
-TRAVELS = tuple(float(t) for t in np.geomspace(0.003, 0.06, 10))
-LOOSE_FREQUENCY, LOOSE_DAMPING = 0.05, 1.0
-LOOSE_RATIO = LOOSE_DAMPING / (4.0 * np.pi * LOOSE_FREQUENCY)
-
-
 @dataclass(frozen=True)
 class Swing:
     """One scanned rider."""
 
     directions: str  # key of DIRECTIONS
     frequency: float  # Hz
-    stop: float = 0.0  # m either side; 0: it meets none
 
     @property
     def effect(self) -> str:
         """Word of the recording contract."""
-        if self.stop:
-            return "loose_mass"
         return "liquid_slosh" if self.directions == "xy" else "sprung_mass"
 
 
-SWINGS = (
-    *(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES),
-    *(Swing(d, LOOSE_FREQUENCY, t) for d in "xy" for t in TRAVELS),
-)
+SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES)
 #: Columns of a swing: the mass, and the mass times each coordinate of its place.
 WIDTH = 4
 
@@ -80,43 +65,6 @@ def filters(frequency: float, step: float, damping: float = DAMPING) -> tuple[Ar
     system = ([-1.0], [1.0, 2.0 * damping * omega, omega**2])
     numerator, denominator, _ = cont2discrete(system, step, method="foh")
     return np.atleast_2d(numerator)[0], np.asarray(denominator)
-
-
-#: Integration steps of a loose mass between two nodes.
-FINE = 4
-
-
-@njit(cache=True, nogil=True)
-def _slide(force, step, stop, q, acceleration):  # type: ignore[no-untyped-def]
-    """Travel and acceleration (N,) of a massless loose part under specific force ``force`` (N,)."""
-    omega = 2.0 * np.pi * STOP_FREQUENCY
-    h = step / FINE
-    place, speed = 0.0, 0.0
-    for k in range(force.shape[0]):
-        q[k] = place
-        total = 0.0
-        for s in range(FINE):
-            ahead = force[min(k + 1, force.shape[0] - 1)]
-            pull = -(force[k] + (s + 0.5) / FINE * (ahead - force[k])) - LOOSE_DAMPING * speed
-            if abs(place) > stop:
-                beyond = place - stop if place > 0.0 else place + stop
-                pull -= omega * omega * beyond + 2.0 * STOP_DAMPING * omega * speed
-            speed += h * pull
-            place += h * speed
-            total += pull / FINE
-        acceleration[k] = total
-
-
-def slides(force: Array, step: float) -> dict[tuple[str, float], tuple[Array, Array]]:
-    """Travel and acceleration (N,) of a massless loose part, by axis and stop. force: see travels."""
-    out = {}
-    for axis in "xy":
-        along = np.ascontiguousarray(force[:, AXES.index(axis)])
-        for stop in TRAVELS:
-            q, acceleration = np.empty_like(along), np.empty_like(along)
-            _slide(along, step, stop, q, acceleration)
-            out[axis, stop] = (q, acceleration)
-    return out
 
 
 def travels(force: Array, gravity: Array, step: float) -> dict[tuple[str, float], tuple[Array, Array]]:
@@ -167,12 +115,11 @@ def rider_wrenches(problem: Problem, evaluation: Evaluation) -> dict[int, Array]
         g_rest = R_rest.T @ model.physics[:3]
         at = f + np.cross(alpha, middle) + np.cross(w, np.cross(w, middle))
         single = travels(at + g_rest, g - g_rest, step)
-        loose = slides(at + g_rest, step)
         wrench = np.zeros((raw.shape[0], 6, WIDTH * len(SWINGS)))
         for k, swing in enumerate(SWINGS):
             for axis in DIRECTIONS[swing.directions]:
                 d = np.eye(3)[AXES.index(axis)]
-                q, acceleration = loose[axis, swing.stop] if swing.stop else single[axis, swing.frequency]
+                q, acceleration = single[axis, swing.frequency]
                 push = -acceleration[:, None] * d
                 wrench[:, :3, WIDTH * k] += push
                 wrench[:, 3:, WIDTH * k] -= np.cross(q[:, None] * d, f)
@@ -203,9 +150,7 @@ def rider_candidate(
         for row, axis in enumerate(axes):
             blocks[row, layout.AXIS + AXES.index(axis)] = 1.0
         blocks[0, layout.POINT : layout.POINT + 3] = middle
-        ratio = LOOSE_RATIO if swing.stop else DAMPING
-        blocks[0, layout.FREQUENCY], blocks[0, layout.DAMPING_RATIO] = swing.frequency, ratio
-        blocks[0, layout.STOP] = swing.stop
+        blocks[0, layout.FREQUENCY], blocks[0, layout.DAMPING_RATIO] = swing.frequency, DAMPING
         blocks[0, layout.PENDULUM] = float(liquid)
         o = place.internal_block(model.cables, model.internal)
 
@@ -220,17 +165,14 @@ def rider_candidate(
                 number(f"position.{a}", "m", float(middle[i]), 0.5 * size, layout.POINT + i, False)
                 for i, a in enumerate(AXES)
             ),
-            number("travel", "m", swing.stop, 0.5, layout.STOP, True)
-            if swing.stop
-            else number("frequency", "Hz", swing.frequency, 0.3, layout.FREQUENCY, True),
-            number("damping_ratio", "1", ratio, 1.0, layout.DAMPING_RATIO, True),
+            number("frequency", "Hz", swing.frequency, 0.3, layout.FREQUENCY, True),
+            number("damping_ratio", "1", DAMPING, 1.0, layout.DAMPING_RATIO, True),
         )
         return model.with_internal(blocks), parameters
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
         out: Told = {}
-        swinging = (("frequency", "Hz"), ("damping_ratio", "1"))
-        for name, unit in (("mass", "kg"), *((("travel", "m"),) if swing.stop else swinging)):
+        for name, unit in (("mass", "kg"), ("frequency", "Hz"), ("damping_ratio", "1")):
             key = f"{effect}.{name}"
             out[name] = (values[key], stds[key], unit)
         for a in AXES:
@@ -248,11 +190,6 @@ def rider_candidate(
             f"A part moves on springs along {swing.directions}:",
             "Block the springs or take the part off.",
             "measure again with the part blocked; a liquid would swing to both sides",
-        ),
-        "loose_mass": (
-            f"Something slides along {swing.directions} and hits its stops:",
-            "Find it by ear, and fix it or take it out.",
-            "measure again with the amplitude halved: what does not reach its stops falls silent",
         ),
     }[effect]
     candidate = Candidate(

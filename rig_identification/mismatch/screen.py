@@ -225,13 +225,9 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
         at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
         candidate, values = rider_candidate(problem, swing, mass, float(step[0]), at)
         best[kind] = Promise(candidate, gain, values)
-    smooth = sorted((kind for kind in best if kind[0] != "loose_mass"), key=lambda kind: -best[kind].gain)
-    for kind in smooth[:FINER]:
+    for kind in sorted(best, key=lambda kind: -best[kind].gain)[:FINER]:
         best[kind] = max(best[kind], *_finer(problem, beyond, best[kind], mass), key=lambda p: p.gain)
-    swinging = max((best[kind].gain for kind in smooth), default=0.0)
-    # Blows against stops look like nothing else: where what swings smoothly promises more nothing is loose,
-    # and the slowest fit of all is saved
-    return [p for (effect, _), p in best.items() if effect != "loose_mass" or p.gain > swinging]
+    return list(best.values())
 
 
 def _finer(problem: Problem, beyond: Beyond, coarse: Promise, mass: float) -> list[Promise]:

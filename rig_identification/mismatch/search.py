@@ -24,7 +24,15 @@ from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
-from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, log_evidence, mass_of
+from rig_identification.mismatch.trial import (
+    Trial,
+    amount_seen,
+    attempt,
+    beyond_doubt,
+    finished,
+    log_evidence,
+    mass_of,
+)
 
 Notify = Callable[[str], None]
 #: The law that explains such pieces, of a body of so many kg; None where none does.
@@ -211,6 +219,9 @@ def trials(
         notify(trial.candidate.label)
         ended = finished(trial, budget)
         if ended is None or not beyond_doubt(ended, ordinary, limit):
+            continue
+        if not far and not amount_seen(ended):
+            # It explains something, with an amount that may as well be none: it stands in for something else
             continue
         ended = fair(ended)
         if ended.evidence > needed:

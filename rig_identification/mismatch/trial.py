@@ -33,6 +33,8 @@ Stop = Callable[[], bool]
 
 #: Std by which one of several numbers may lie on the wrong side of zero by chance.
 ABSURD = 3.0
+#: Std by which an amount has to lie clear of none.
+PLAIN = 3.0
 #: Steps of a first, short fit (more where the model itself changes) and of one to the end.
 FIRST_STEPS = 4
 CHANGED_STEPS = 7
@@ -128,28 +130,20 @@ def attempt(
     try:
         if candidate.build is not None:
             point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE, stop)
-            fitted, settled = _first_steps(wide, point, CHANGED_STEPS, candidate, stop)
+            fitted, settled = _first_steps(wide, point, CHANGED_STEPS, stop)
         else:
-            fitted, settled = _from_promise(wide, point, begun, candidate, stop)
+            fitted, settled = _from_promise(wide, point, begun, stop)
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
 
 
-def _bends(candidate: Candidate) -> bool:
-    """Whether steps are bent along their valley: blows have no second derivative to follow."""
-    return candidate.effect != "loose_mass"
-
-
-def _first_steps(
-    problem: Problem, point: Point, steps: int, candidate: Candidate, stop: Stop | None
-) -> tuple[Evaluation, bool]:
-    bends = _bends(candidate)
-    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=bends, stop=stop)
+def _first_steps(problem: Problem, point: Point, steps: int, stop: Stop | None) -> tuple[Evaluation, bool]:
+    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=True, stop=stop)
 
 
 def _from_promise(
-    problem: Problem, promised: Point, begun: Point, candidate: Candidate, stop: Stop | None
+    problem: Problem, promised: Point, begun: Point, stop: Stop | None
 ) -> tuple[Evaluation, bool]:
     """First steps of a fit that does not change the model.
 
@@ -160,13 +154,13 @@ def _from_promise(
     """
     there, here = (evaluate(problem, p, residuals_only=True) for p in (promised, begun))
     if there is None:
-        return _first_steps(problem, begun, FIRST_STEPS, candidate, stop)
+        return _first_steps(problem, begun, FIRST_STEPS, stop)
     if here is None or there.cost <= here.cost:
-        return _first_steps(problem, promised, FIRST_STEPS, candidate, stop)
-    fitted, settled = _first_steps(problem, promised, RETURNING_STEPS, candidate, stop)
+        return _first_steps(problem, promised, FIRST_STEPS, stop)
+    fitted, settled = _first_steps(problem, promised, RETURNING_STEPS, stop)
     if fitted.cost > here.cost:
-        return _first_steps(problem, begun, FIRST_STEPS, candidate, stop)
-    return (fitted, settled) if settled else _first_steps(problem, fitted.point, FIRST_STEPS, candidate, stop)
+        return _first_steps(problem, begun, FIRST_STEPS, stop)
+    return (fitted, settled) if settled else _first_steps(problem, fitted.point, FIRST_STEPS, stop)
 
 
 def promised(
@@ -239,7 +233,7 @@ def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
             iterations=LAST_STEPS,
             tolerance=0.05,
             polish=POLISH,
-            bends=_bends(trial.candidate),
+            bends=True,
             stop=stop,
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
@@ -286,6 +280,11 @@ def signs(trial: Trial) -> list[float]:
         return []
     seen = in_stds(trial)
     return [seen[p.name] for p in positive]
+
+
+def amount_seen(trial: Trial) -> bool:
+    """Whether any amount that cannot be negative lies clear of none; what has no such amount does."""
+    return max(signs(trial), default=PLAIN) >= PLAIN
 
 
 def in_stds(trial: Trial) -> dict[str, float]:

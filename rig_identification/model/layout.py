@@ -31,9 +31,10 @@ POINT = 6  # 3: m, body: where a rider rests
 FREQUENCY = 9  # Hz
 DAMPING_RATIO = 10
 COMPLIANCE = 11  # m/N (ceiling)
-STOP = 12  # m: a rider meets its stops this far from rest; 0: it has none
+STOP = 12  # m: a rider slides and meets its stops this far from its place; 0: it has none
 PENDULUM = 13  # constant: 1 where a rider of two coordinates hangs instead of riding on springs
-INTERNAL_SIZE = 14
+STOP_DAMPING = 14  # damping ratio of the stops: how much of a blow's energy they keep
+INTERNAL_SIZE = 15
 RIDER = 0.0
 CEILING = 1.0
 

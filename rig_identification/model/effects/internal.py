@@ -7,7 +7,8 @@ A rider of mass m rests at a (body axes) and is displaced to rho = a + sum d_k q
 equation along d_j, divided by m so that it holds for a massless passenger as well,
     d_j . (A + alpha x rho + w x (w x rho) + 2 w x rho' + sum d_k q_k'' - (g - g_rest))
         = -(2 pi f)^2 q_j - 2 zeta 2 pi f d_j . sum d_k q_k'
-g_rest is gravity as the body feels it in its rest pose, where the rider's spring bears it.
+g_rest is gravity as the body feels it in its rest pose, where the rider's spring bears it. What is loose
+has no such spring: g stands for g - g_rest, and on a floor that is not level it lies against a stop.
 The body's ten numbers count the rider as fixed at a, so that the body feels the difference:
 point inertia and weight at rho less those at a, m 2 w x rho', and m d_k q_k''.
 A liquid's first mode is a pendulum of length l = g/(2 pi f)^2 (Ibrahim, "Liquid Sloshing Dynamics",
@@ -49,11 +50,11 @@ from rig_identification.model.layout import (
     POINT,
     RATE,
     STOP,
+    STOP_DAMPING,
 )
 
-#: Stops are springs on which the rider would swing at this frequency (Hz), and damp like wood.
+#: Stops are springs on which the rider would swing at this frequency (Hz).
 STOP_FREQUENCY = 20.0
-STOP_DAMPING = 0.3
 
 
 @njit(cache=True)
@@ -93,7 +94,7 @@ def add_ceiling(physics, cables, x, R, cable, ux, uy, uz, rigid, K):  # type: ig
 
 
 @njit(cache=True)
-def _stop_force(q, speed, stop):  # type: ignore[no-untyped-def]
+def _stop_force(q, speed, stop, ratio):  # type: ignore[no-untyped-def]
     """Acceleration with which a stop pushes a rider back."""
     omega = 2.0 * math.pi * STOP_FREQUENCY
     nothing = 0.0 * q
@@ -104,7 +105,7 @@ def _stop_force(q, speed, stop):  # type: ignore[no-untyped-def]
         beyond = q + stop
     else:
         return nothing
-    return -omega * omega * beyond - 2.0 * STOP_DAMPING * omega * speed
+    return -omega * omega * beyond - 2.0 * ratio * omega * speed
 
 
 @njit(cache=True)
@@ -131,8 +132,10 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
     nx, ny, nz, per_s = nothing, nothing, nothing, nothing
     qx, qy, qz = nothing, nothing, nothing
     hangs = physics[lead + PENDULUM].real > 0.0
-    if hangs:
+    if hangs or stop.real > 0.0:
+        # No spring bears its weight
         bx, by, bz = gx, gy, gz
+    if hangs:
         o, p = lead, lead + INTERNAL_SIZE
         nx = physics[o + AXIS + 1] * physics[p + AXIS + 2] - physics[o + AXIS + 2] * physics[p + AXIS + 1]
         ny = physics[o + AXIS + 2] * physics[p + AXIS] - physics[o + AXIS] * physics[p + AXIS + 2]
@@ -221,7 +224,7 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
         if not hangs:
             r[row] -= omega * omega * q
         if stop.real > 0.0:
-            r[row] += _stop_force(q, speed, stop)
+            r[row] += _stop_force(q, speed, stop, physics[lead + STOP_DAMPING])
 
 
 @njit(cache=True)

@@ -1,0 +1,93 @@
+"""The motion that was measured, where the ideal model fails: a random wrench beside it stands for that.
+
+What acts on the body is looked for along that motion, by how much of the random wrench it makes needless.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.follow import SPEED, START, followed
+from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.prediction import model_at, smoothed
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
+from rig_identification.estimate.track import start_covariance, wrench_noise
+from rig_identification.model.motion import on_cables
+
+Array = NDArray[np.float64]
+
+#: Std of the random wrench, over a tenth of a second, as a share of the body's weight: at first, and least.
+SHARE, LEAST = 0.05, 1e-4
+#: Factor between the random wrenches of which the weakest is looked for, and the mean square of whitened
+#: residuals at which one is strong enough.
+STRONGER, ENOUGH = 3.0, 1.1
+#: Rounds in which the motion is brought to what was measured.
+ROUNDS = 2
+
+
+def fitting_wrench(problem: Problem, point: Point, mass: float) -> tuple[Problem, Point] | None:
+    """The problem with a random wrench about as strong as what the model lacks; see :func:`with_wrench`."""
+    widest = with_wrench(problem, replace(point, latents=()), mass)
+    if widest is None or widest[0].extra_noise is None:
+        return widest
+    weight = np.diag(widest[0].extra_noise)
+    parts = [latent**2 / weight for latent in widest[1].latents if latent is not None]
+    size = float(np.sqrt(np.mean(np.concatenate(parts))))
+    return with_wrench(problem, widest[1], mass, max(LEAST, SHARE * size))
+
+
+def with_wrench(
+    problem: Problem, point: Point, mass: float, share: float = SHARE
+) -> tuple[Problem, Point] | None:
+    """The problem with a random wrench beside the model, and the point at which it follows what was measured.
+
+    None where a run cannot be followed. mass: kg, roughly. share: std of the wrench over a tenth of a
+    second, in parts of the weight.
+    """
+    rig = problem.bench.rig
+    size, step = float(np.max(extent(rig))), problem.runs[0].grid.step
+    noisy = replace(problem, extra_noise=wrench_noise(mass, rig.gravity, 0.3 * size, step, share))
+    there = followed(noisy, point)
+    return None if there is None else (noisy, there)
+
+
+def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Evaluation] | None:
+    """The problem with the weakest random wrench with which it leaves noise, about the measured motion.
+
+    None where a run cannot be followed. mass: kg, roughly. The random wrench is in the point's latents.
+    """
+    share, there, found = LEAST, replace(point, latents=()), None
+    while found is None:
+        wide = with_wrench(problem, there, mass, share)
+        evaluation = None if wide is None else evaluate(*wide)
+        if wide is None or evaluation is None:
+            return None
+        there = evaluation.point
+        if misfit(evaluation) < ENOUGH or share >= SHARE:
+            found = wide[0], evaluation
+        share *= STRONGER
+    for _ in range(ROUNDS):
+        moved = _smoothed(*found)
+        if moved is None:
+            break
+        found = found[0], moved
+    return found
+
+
+def _smoothed(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
+    """About the motion to which the smoother brings that of ``evaluation``, whatever it gains."""
+    model = model_at(problem.bench.parameters, evaluation.point.theta)
+    starts, latents = [], []
+    for run, start, latent in zip(
+        evaluation.runs, evaluation.point.starts, evaluation.point.latents, strict=True
+    ):
+        P = np.zeros((run.motion.states.shape[1],) * 2)
+        P[:12, :12] = start_covariance(START, SPEED)
+        states, wrenches, _ = smoothed(run, P)
+        starts.append(on_cables(model, start.moved(states[0])))
+        latents.append(wrenches if latent is None else latent + wrenches)
+    return evaluate(problem, replace(evaluation.point, starts=tuple(starts), latents=tuple(latents)))
