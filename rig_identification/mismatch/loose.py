@@ -52,12 +52,12 @@ PEOPLE, GENERATIONS, POLISHED = 12, 60, 60
 #: First steps of the simplex: in the logarithms, and in the place.
 NUDGES = (0.03, 0.2, 0.3, 0.3, 0.15, 0.15, 0.15)
 #: Std of a travel that blows were timed by, and of a mass that they tell, as a share of each: blows that come
-#: some milliseconds early or late in the scan make a part look lighter than it is.
-TIMED, WEIGHED = 0.1, 1.0
+#: some milliseconds early or late in the scan make a part look lighter, and its way longer or shorter.
+TIMED, WEIGHED = 0.5, 1.0
 #: Nats by which a loose part has to be likelier than all else, and by which held-out runs have to confirm it.
 AHEAD, CONFIRMED = 30.0, 10.0
-#: Prior std of its mass, in parts of the body's.
-LIKELY = 0.05
+#: Prior std of its mass, in parts of the body's, and the number of them past which it is no part of the body.
+LIKELY, FARTHEST = 0.05, 3.0
 
 
 @njit(cache=True, nogil=True)
@@ -231,7 +231,10 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
         lambda x: away(x) - along.gain(part(axis, x)).nats,
         x,
         method="Nelder-Mead",
-        options={"maxfev": POLISHED, "initial_simplex": x + np.vstack([np.zeros(7), np.diag(NUDGES)])},
+        options={
+            "maxfev": POLISHED,
+            "initial_simplex": x + np.vstack([np.zeros(len(NUDGES)), np.diag(NUDGES)]),
+        },
     )
     chosen = part(axis, np.asarray(polished.x))
     return chosen, along.gain(chosen)
@@ -249,7 +252,8 @@ def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:
         return None
     along = Along(*seen, mass)
     part, gain = likeliest(along, middle_of(problem.bench.rig), spread_of(problem))
-    held = _held_out(fitted, problem, mass) if gain.nats > AHEAD else None
+    likely = gain.nats > AHEAD and gain.mass < FARTHEST * LIKELY * mass
+    held = _held_out(fitted, problem, mass) if likely else None
     again = None if held is None else held.gain(part)
     if again is None or again.nats < CONFIRMED:
         return None

@@ -148,6 +148,9 @@ def settle(model: RigModel, start: State, swings: int = 40) -> State:
     for _ in range(swings):
         motion = simulate(model, state, drive)
         speed = np.sum(motion.states[: motion.nodes, 6:12] ** 2, axis=1)
+        if not speed.size:
+            # From here nothing moves within bounds: there is no rest to fall to
+            break
         peak = int(np.argmax(speed))
         reached = motion.state(peak)
         state = on_cables(model, State(reached.position, reached.R_world_body, np.zeros(3), np.zeros(3)))
