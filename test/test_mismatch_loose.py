@@ -89,7 +89,8 @@ def fitted(effects: dict[str, tuple[float, ...]]) -> Fitted:
     return fit_session(simulate_session(spec, np.random.default_rng(3))[0])
 
 
-def test_a_loose_part_is_told_with_its_axis_and_travel() -> None:
+def test_a_loose_part_is_told_with_its_axis_and_mass() -> None:
+    """It lies at one stop for the most, and leaves open how far the other one is."""
     truth = {
         "loose_mass.mass": (12.0,),
         "loose_mass.travel": (0.02,),
@@ -101,11 +102,10 @@ def test_a_loose_part_is_told_with_its_axis_and_travel() -> None:
     found = loose_finding(fitted(truth), 2.0)
     assert found is not None
     assert (found.effect, found.where["axis"]) == ("loose_mass", "y")
-    for name, true in (("mass", 12.0), ("travel", 0.02)):
-        value, std = found.parameters[name]["value"], found.parameters[name]["std"]
-        assert isinstance(value, float)
-        assert isinstance(std, float)
-        assert 0.0 < value - true + 3.0 * std < 6.0 * std
+    value, std = found.parameters["mass"]["value"], found.parameters["mass"]["std"]
+    assert isinstance(value, float)
+    assert isinstance(std, float)
+    assert abs(value - 12.0) < 3.0 * std
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def slide(force, step, first, stop, rate, frequency, ratio, q, acceleration):  #
 
 @njit(cache=True, nogil=True)
 def _passenger(raw, axis, at, step, stop, rate, frequency, ratio):  # type: ignore[no-untyped-def]
-    """(N, 6) wrench that a kilogram loose at ``at`` exerts along the raw outputs of a motion."""
+    """(N, 6) wrench that a kilogram loose at ``at`` exerts along the raw outputs of a motion, (N,) travel."""
     nodes = raw.shape[0]
     i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3
     felt = np.empty(nodes)
@@ -104,7 +104,7 @@ def _passenger(raw, axis, at, step, stop, rate, frequency, ratio):  # type: igno
         out[n, i] = push
         out[n, 3 + j] = at[k] * push + q[n] * raw[n, FORCE + k]
         out[n, 3 + k] = -at[j] * push - q[n] * raw[n, FORCE + j]
-    return out
+    return out, q
 
 
 @njit(cache=True, nogil=True)
@@ -138,7 +138,15 @@ class Loose:
 
     def wrench(self, motion: Motion) -> Array:
         """(N, 6) wrench about the datum, body axes, of a kilogram of it along a motion that began at rest."""
-        out = _passenger(
+        return self._along(motion)[0]
+
+    def to_either_side(self, motion: Motion) -> bool:
+        """Whether it leaves the one stop for the other: else nothing tells how far apart they are."""
+        q = self._along(motion)[1]
+        return bool(np.min(q) < -0.5 * self.travel and np.max(q) > 0.5 * self.travel)
+
+    def _along(self, motion: Motion) -> tuple[Array, Array]:
+        wrench, q = _passenger(
             motion.outputs,
             AXES.index(self.axis),
             self.at,
@@ -148,7 +156,7 @@ class Loose:
             self.stop,
             self.ratio,
         )
-        return np.asarray(out)
+        return np.asarray(wrench), np.asarray(q)
 
 
 @dataclass(frozen=True)
@@ -260,7 +268,8 @@ def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:
     rivals = screen(*seen, catalogue(problem), mass)
     if rivals and gain.nats < rivals[0].gain + AHEAD:
         return None
-    return _told(part, gain, again, before)
+    between = any(part.to_either_side(run.motion) for run in seen[1].runs)
+    return _told(part, between, gain, again, before)
 
 
 def _held_out(fitted: Fitted, problem: Problem, mass: float) -> Along | None:
@@ -274,13 +283,20 @@ def _held_out(fitted: Fitted, problem: Problem, mass: float) -> Along | None:
     return None if seen is None else Along(*seen, mass, fixed=True)
 
 
-def _told(part: Loose, gain: Gain, again: Gain, before: float | None) -> Finding:
-    """The finding in words and numbers. again: the gain in held-out runs, which tell the mass once more."""
+def _told(part: Loose, between: bool, gain: Gain, again: Gain, before: float | None) -> Finding:
+    """The finding in words and numbers.
+
+    between: it hits both stops. again: the gain in held-out runs, which tell the mass once more.
+    """
     std = max(float(np.hypot(gain.std, gain.mass - again.mass)), WEIGHED * gain.mass)
-    quantities = {"mass": (gain.mass, std, "kg"), "travel": (part.travel, TIMED * part.travel, "m")}
+    quantities = {"mass": (gain.mass, std, "kg")}
+    stops = "a stop"
+    if between:
+        quantities["travel"] = part.travel, TIMED * part.travel, "m"
+        stops = f"its stops {1e3 * part.travel:.0f} mm to either side"
     told = f"{gain.mass:.2g} kg of it or more (± {std:.2g} kg; blows timed a little off make it look lighter)"
     text = (
-        f"Something slides along {part.axis} and hits its stops {1e3 * part.travel:.0f} mm to either side: "
+        f"Something slides along {part.axis} and hits {stops}: "
         f"about {told}. Nothing else of the catalogue takes as much of the missing wrench away, and where "
         f"nothing was fitted it does so too ({gain.nats:.0f} and {again.nats:.0f} nats). The blows "
         "themselves are not followed to the noise. Find it by ear, and fix it or take it out."
