@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.prediction import Linearised, linearise_run, model_at, smoothed
+from rig_identification.estimate.prediction import Linearised, linearise_run, model_at
 from rig_identification.estimate.solve import Point, Problem
-from rig_identification.estimate.track import start_covariance
+from rig_identification.estimate.track import smoothed_from
 from rig_identification.model.motion import State, on_cables
 
 Array = NDArray[np.float64]
@@ -57,10 +57,8 @@ def _followed(
     seen = at(start, held)
     if seen is None:
         return None
-    P = np.zeros((seen.motion.states.shape[1],) * 2)
-    P[:12, :12] = start_covariance(START, SPEED)
     for _ in range(ROUNDS):
-        states, wrenches, _ = smoothed(seen, P)
+        states, wrenches = smoothed_from(seen, START, SPEED)
         length, won = 1.0, 0.0
         while length > SHORTEST and won <= 0.0:
             moved = on_cables(model, start.moved(length * states[0]))

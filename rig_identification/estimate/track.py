@@ -57,6 +57,17 @@ def start_covariance(spread: float = 0.05, speed: float = 0.2) -> Array:
     return np.diag([spread**2] * 6 + [speed**2] * 6)
 
 
+def smoothed_from(linearised: Linearised, spread: float, speed: float) -> tuple[Array, Array]:
+    """(N, X) state and (N, 6) wrench corrections of a run that starts about where it is known to.
+
+    spread, speed: see :func:`start_covariance`; what swings inside begins where the model has it.
+    """
+    P = np.zeros((linearised.motion.states.shape[1],) * 2)
+    P[:12, :12] = start_covariance(spread, speed)
+    states, wrenches, _ = smoothed(linearised, P)
+    return states, wrenches
+
+
 def doubted_variance(bench: Bench, run: Run, theta: Array, start: State, doubted: float) -> dict[Row, float]:
     """Variance of each reading for what rig and devices may be off by, as if it were noise.
 

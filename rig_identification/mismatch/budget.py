@@ -29,3 +29,7 @@ class Budget:
     def late(self) -> bool:
         """Whether what was found has to be told as it is; a fit of whole runs asks between its steps."""
         return self._elapsed() > self.seconds + LATEST - SECONDS
+
+
+#: For a fit that nothing but its own end ends.
+UNLIMITED = Budget(float("inf"))

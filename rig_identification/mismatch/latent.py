@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.launch import launch_state
-from rig_identification.estimate.prediction import Bench, linearise_run, smoothed
+from rig_identification.estimate.prediction import Bench, linearise_run
 from rig_identification.estimate.start_state import fit_start
-from rig_identification.estimate.track import start_covariance, wrench_noise
+from rig_identification.estimate.track import smoothed_from, wrench_noise
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 SHARE = 0.02
 #: Interval (s) over which it is averaged: shorter courses are noise.
 AVERAGED = 0.1
+#: Std (m and rad; m/s and rad/s) of a start state that was fitted.
+LAUNCHED = (0.002, 0.01)
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,7 @@ def missing_wrench(bench: Bench, run: Run, theta: Array, rest: State, mass: floa
     linearised = linearise_run(bench, run, theta, found[1], start_only=True, extra_noise=noise)
     if linearised is None:
         return None
-    P = np.zeros((linearised.motion.states.shape[1],) * 2)
-    P[:12, :12] = start_covariance(0.002, 0.01)
-    corrections, wrenches, _ = smoothed(linearised, P)
+    corrections, wrenches = smoothed_from(linearised, *LAUNCHED)
     width = max(1, round(AVERAGED / step))
     kernel = np.ones(width) / width
     averaged: Array = np.stack([np.convolve(w, kernel, mode="same") for w in wrenches.T], axis=1)

@@ -213,28 +213,24 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
     """The part that takes most away. middle (3,) m, spread m: about where it is looked for."""
 
     def part(axis: str, x: Array) -> Loose:
-        travel, rate, stop, ratio = np.exp(
-            np.clip(x[:4], [b[0] for b in BOUNDS[:4]], [b[1] for b in BOUNDS[:4]])
-        )
+        travel, rate, stop, ratio = np.exp(np.clip(x[:4], *np.array(BOUNDS[:4]).T))
         return Loose(axis, float(travel), float(rate), float(stop), float(ratio), middle + spread * x[4:])
 
     def away(x: Array) -> float:
         return 0.5 * float(x[4:] @ x[4:])
 
-    best: tuple[float, str, Array] | None = None
-    for axis in AXES:
-
-        def missed(x: Array, axis: str = axis) -> float:
-            return away(x) - along.likeness(part(axis, x))
-
+    def nearest(axis: str) -> tuple[float, str, Array]:
         found = differential_evolution(
-            missed, BOUNDS, popsize=PEOPLE, maxiter=GENERATIONS, seed=1, polish=False
+            lambda x: away(x) - along.likeness(part(axis, x)),
+            BOUNDS,
+            popsize=PEOPLE,
+            maxiter=GENERATIONS,
+            seed=1,
+            polish=False,
         )
-        if best is None or found.fun < best[0]:
-            best = float(found.fun), axis, np.asarray(found.x)
-    if best is None:
-        raise ValueError("there is no axis to look along")
-    _, axis, x = best
+        return float(found.fun), axis, np.asarray(found.x)
+
+    _, axis, x = min((nearest(axis) for axis in AXES), key=lambda found: found[0])
     polished = minimize(
         lambda x: away(x) - along.gain(part(axis, x)).nats,
         x,

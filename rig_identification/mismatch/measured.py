@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.follow import SPEED, START, followed
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.prediction import model_at, smoothed
+from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
-from rig_identification.estimate.track import start_covariance, wrench_noise
+from rig_identification.estimate.track import smoothed_from, wrench_noise
 from rig_identification.model.motion import on_cables
 
 Array = NDArray[np.float64]
@@ -63,12 +63,14 @@ def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Eval
     share, there, found = LEAST, replace(point, latents=()), None
     while found is None:
         wide = with_wrench(problem, there, mass, share)
-        evaluation = None if wide is None else evaluate(*wide)
-        if wide is None or evaluation is None:
+        if wide is None:
             return None
-        there = evaluation.point
+        noisy, there = wide
+        evaluation = evaluate(noisy, there)
+        if evaluation is None:
+            return None
         if misfit(evaluation) < ENOUGH or share >= SHARE:
-            found = wide[0], evaluation
+            found = noisy, evaluation
         share *= STRONGER
     for _ in range(ROUNDS):
         moved = _smoothed(*found)
@@ -85,9 +87,7 @@ def _smoothed(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
     for run, start, latent in zip(
         evaluation.runs, evaluation.point.starts, evaluation.point.latents, strict=True
     ):
-        P = np.zeros((run.motion.states.shape[1],) * 2)
-        P[:12, :12] = start_covariance(START, SPEED)
-        states, wrenches, _ = smoothed(run, P)
+        states, wrenches = smoothed_from(run, START, SPEED)
         starts.append(on_cables(model, start.moved(states[0])))
         latents.append(wrenches if latent is None else latent + wrenches)
     return evaluate(problem, replace(evaluation.point, starts=tuple(starts), latents=tuple(latents)))

@@ -21,7 +21,7 @@ from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, model_at
 from rig_identification.estimate.solve import HOPELESS, POLISH, Evaluation, Point, Problem, evaluate, solve
-from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.model.equilibrium import find_rest
@@ -116,13 +116,13 @@ def _left(found: tuple[Linearised, State]) -> float:
 
 
 def attempt(
-    problem: Problem, evaluation: Evaluation, promise: Promise, budget: Budget | None = None
+    problem: Problem, evaluation: Evaluation, promise: Promise, budget: Budget = UNLIMITED
 ) -> Trial | None:
     """A first, short fit of one hypothesis from what screening promised; None where it cannot start.
 
     It ends where the ``budget`` is spent.
     """
-    stop = None if budget is None else budget.spent
+    stop = budget.spent
     candidate = promise.candidate
     wide = extended(problem, (candidate,))
     begun = carried(wide, problem, evaluation.point)
@@ -138,13 +138,11 @@ def attempt(
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
 
 
-def _first_steps(problem: Problem, point: Point, steps: int, stop: Stop | None) -> tuple[Evaluation, bool]:
+def _first_steps(problem: Problem, point: Point, steps: int, stop: Stop) -> tuple[Evaluation, bool]:
     return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=True, stop=stop)
 
 
-def _from_promise(
-    problem: Problem, promised: Point, begun: Point, stop: Stop | None
-) -> tuple[Evaluation, bool]:
+def _from_promise(problem: Problem, promised: Point, begun: Point, stop: Stop) -> tuple[Evaluation, bool]:
     """First steps of a fit that does not change the model.
 
     A promise holds where all that is fitted moves with it, to first order. By itself, over half a minute, it
@@ -180,7 +178,7 @@ def promised(
     return point if candidate.settle is None else candidate.settle(problem, point, evaluation)
 
 
-def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool, stop: Stop | None) -> Point:
+def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool, stop: Stop) -> Point:
     """The point from where a fit of a changed model to all of its runs starts.
 
     A changed model throws the start states out first, and its amount comes before its other ratios. Where
@@ -220,13 +218,13 @@ def _with_amount(problem: Problem, candidate: Candidate, point: Point) -> Point:
     return carried(problem, narrow, fitted.point)
 
 
-def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
+def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
     """The trial fitted to its end, as its closest description has it; None where its sign makes no sense.
 
     Where the ``budget`` is spent it stays where it is.
     """
-    stop = None if budget is None else budget.spent
-    if not trial.settled and not (stop is not None and stop()):
+    stop = budget.spent
+    if not trial.settled and not stop():
         fitted, _ = solve(
             trial.problem,
             trial.evaluation.point,
@@ -239,7 +237,7 @@ def finished(trial: Trial, budget: Budget | None = None) -> Trial | None:
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
     if not _sensible(trial):
         return None
-    if trial.candidate.closer is None or (stop is not None and stop()):
+    if trial.candidate.closer is None or stop():
         return trial
     closer = (
         _described(trial, candidate, values, stop)
@@ -254,9 +252,7 @@ def _sensible(trial: Trial) -> bool:
     return all(z >= (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial))
 
 
-def _described(
-    trial: Trial, candidate: Candidate, values: dict[str, float], stop: Stop | None
-) -> Trial | None:
+def _described(trial: Trial, candidate: Candidate, values: dict[str, float], stop: Stop) -> Trial | None:
     """The trial with another description of its effect, started at ``values`` and fitted to its end."""
     problem = trial.problem
     instead = {q.name for q in trial.candidate.parameters}
