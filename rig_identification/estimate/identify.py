@@ -16,6 +16,7 @@ from rig_identification.estimate.first_guess import first_elements, mocap_mount,
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_state, tracked
+from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
@@ -37,7 +38,12 @@ from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.model.sensors import MocapMount
 from rig_identification.recording import Session
-from rig_identification.result import ChannelFit, Identification, Mismatch, ParameterEstimate
+from rig_identification.result import (
+    ChannelFit,
+    Identification,
+    Mismatch,
+    ParameterEstimate,
+)
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -328,6 +334,12 @@ CAUTION = (
     "weighs each channel by its own residual; their intervals hold what the model lacks only as far as "
     "the residuals show it."
 )
+#: Factor on a std from which it is said that rivals make it wider.
+WIDER = 1.5
+TIED = (
+    "Other explanations that these recordings hardly tell apart make another body of them. The ten numbers "
+    "and their intervals cover all of those explanations, each weighed by how likely it is."
+)
 
 
 def fit_ideal(session: Session, notify: Progress, assumed: Assumed | None = None) -> Ideal:
@@ -395,15 +407,22 @@ def compose(
     mismatch: Mismatch,
     careful: tuple[Problem, Evaluation] | None,
     loose: float = 1.0,
+    rivals: Bodies = (),
 ) -> Identification:
     """Everything that a fit says of a session; the body from the cautious fit where there is one.
 
-    loose: factor on the body's covariance, for a trace that the model leaves.
+    loose: factor on the body's covariance, for a trace that the model leaves. rivals: what models that
+    these recordings hardly tell apart make of the body.
     """
     if careful is not None:
         loose *= coherence(*careful)
     total = inertial_estimate(*(careful or (fitted.problem, fitted.evaluation)))
-    total = replace(total, covariance=loose * total.covariance)
+    alone = replace(total, covariance=loose * total.covariance)
+    total = mixture(alone, rivals)
+    wider = np.sqrt(np.diag(total.covariance) / np.diag(alone.covariance))
+    notes = fitted.notes + ((CAUTION,) if careful else ())
+    if float(np.max(wider)) > WIDER:
+        notes += (TIED,)
     frame = session.rig.frame
     return Identification(
         total=total,
@@ -414,7 +433,7 @@ def compose(
         holdout_error=found.holdout,
         training_error=found.training,
         converged=fitted.converged,
-        notes=fitted.notes + ((CAUTION,) if careful else ()),
+        notes=notes,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.solve import excess
 from rig_identification.result import Mismatch
 
@@ -24,6 +25,7 @@ class Explained:
     ideal: Ideal
     loose: float = 1.0  # factor on every variance where a trace is left
     trace: bool = False  # whether something is left at all, be it next to nothing
+    bodies: Bodies = ()  # what rivals make of the body
 
 
 def only_a_trace(ideal: Fitted, fitted: Fitted, square: float = TRACE_SQUARE) -> bool:

@@ -115,5 +115,7 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
         return (plain if note is None else replace(plain, notes=(*plain.notes, note))), fitted
     careful = None if found.mismatch.verdict == "explained" else found.ideal.careful
-    answer = compose(session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose)
+    answer = compose(
+        session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
+    )
     return replace(answer, figures={**answer.figures, "ideal": plain}), fitted

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.mixture import Bodies
+from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.findings import rival
@@ -30,6 +32,7 @@ class Search:
     share: float = 0.0  # of that excess that the effects found take away
     found: list[Trial] = field(default_factory=list)
     rivals: list[dict[str, object]] = field(default_factory=list)
+    bodies: Bodies = ()  # what rivals of the last one found make of the body, where whole runs say so
     liar: str | None = None
     screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
 
@@ -41,9 +44,13 @@ class Search:
     def adopt(self, tried: Trials, chosen: Trial) -> None:
         """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals."""
         self.found.append(chosen)
-        self.rivals += [
-            rival(t, chosen) for t in tried.done if t is not chosen and t.evidence <= chosen.evidence
-        ]
+        others = [t for t in tried.done if t is not chosen and t.evidence <= chosen.evidence]
+        self.rivals += [rival(t, chosen) for t in others]
+        self.bodies = ()
+        if self.whole:
+            self.bodies = tuple(
+                (chosen.evidence - t.evidence, inertial_estimate(t.problem, t.evaluation)) for t in others
+            )
         self.here, self.evaluation = adopted(self.here, self.evaluation, chosen)
 
 

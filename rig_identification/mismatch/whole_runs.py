@@ -52,7 +52,9 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     else:
         told = "unexplained"
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
-    return Explained(fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace)
+    return Explained(
+        fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace, search.bodies
+    )
 
 
 def _at(fitted: Fitted, trial: Trial) -> Trial:
