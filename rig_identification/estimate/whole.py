@@ -18,6 +18,8 @@ from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
 
+#: Steps of a fit of whole runs: short pieces may leave a body far along a flat valley.
+STEPS = 40
 #: Rounds of following what happened and fitting about it.
 FOLLOWED = 4
 
@@ -47,7 +49,9 @@ def fit_whole(
     begin = Point(point.theta, starts, point.rest_guesses)
     bends = whole.bench.parameters.model.internal > 0
     found = _about_what_happened(whole, begin, stop) if curved else None
-    evaluation, converged = found or solve(whole, begin, iterations=20, polish=POLISH, bends=bends, stop=stop)
+    evaluation, converged = found or solve(
+        whole, begin, iterations=STEPS, polish=POLISH, bends=bends, stop=stop
+    )
     known = (*ideal.holdout_runs, *ideal.lost)
     held_runs, held, lost = predicted(whole, known, evaluation.point.theta, rest)
     return replace(
@@ -70,7 +74,7 @@ def _about_what_happened(
         there = followed(whole, point)
         if there is None:
             break
-        found = solve(whole, there, iterations=20, bends=True, stop=stop)
+        found = solve(whole, there, iterations=STEPS, bends=True, stop=stop)
         point = found[0].point
         if found[1] or (stop is not None and stop()):
             break

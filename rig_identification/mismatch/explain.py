@@ -19,6 +19,7 @@ from rig_identification.mismatch.screen import screen, with_reference
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.undecided import undecided
 
 Notify = Callable[[str, float], None]
 
@@ -48,18 +49,22 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     """What no residual shows by itself, and a hypothesis that knows what to look for does.
 
     A score test of all hypotheses at once: one among ever so many that gains more than chance does is fitted,
-    and told if it explains every run. Otherwise there is nothing to tell.
+    and told if it explains every run. Otherwise what may be there beside nothing is stated.
     """
     notify("search: anything within the noise", 0.1)
     fitted = ideal.fitted
     problem = with_reference(fitted.problem, fitted.rest)
     candidates = catalogue(problem)
     promises = screen(problem, fitted.evaluation, candidates, mass_of(problem, fitted.evaluation))
-    if not worth_a_fit(promises, count_of(candidates)):
-        return None
-    search = Search(problem, problem, fitted.evaluation, excess(fitted.evaluation), budget, screened=promises)
-    best = named(ideal, search, notify)
-    return best if best is not None and best.mismatch.verdict == "explained" and not best.trace else None
+    count = count_of(candidates)
+    if worth_a_fit(promises, count):
+        search = Search(
+            problem, problem, fitted.evaluation, excess(fitted.evaluation), budget, screened=promises
+        )
+        best = named(ideal, search, notify)
+        if best is not None and best.mismatch.verdict == "explained" and not best.trace:
+            return best
+    return undecided(ideal, problem, fitted.evaluation, promises, count, notify, budget)
 
 
 def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:

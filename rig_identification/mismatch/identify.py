@@ -114,6 +114,11 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
         ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
         return (plain if note is None else replace(plain, notes=(*plain.notes, note))), fitted
+    if found.mismatch.verdict == "none":
+        stated = compose(
+            session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies
+        )
+        return stated, fitted
     careful = None if found.mismatch.verdict == "explained" else found.ideal.careful
     answer = compose(
         session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies

@@ -55,6 +55,7 @@ class Promise:
     gain: float  # nats
     values: dict[str, float]  # its parameters, in their own units
     share: float = 0.0  # of what the ideal model leaves, to first order, that it takes away
+    charge: float | None = None  # nats that evidence charges it for what it could have explained, if known
 
 
 def with_reference(problem: Problem, rest: State) -> Problem:
@@ -169,7 +170,21 @@ def _promise(
         chosen = [i for i in chosen if i not in wrong]
     gain = 0.5 * float(step[index] @ gradient[index]) - _gain(full.information, full.gradient, base)
     values = {q.name: free[i - INERTIAL].value(point.theta[i] + step[i]) for q, i in _with(candidate, column)}
-    return Promise(candidate, gain, values)
+    return Promise(candidate, gain, values, charge=_charge(wide, full, base, candidate))
+
+
+def _charge(wide: Problem, full: Evaluation, base: NDArray[np.int64], candidate: Candidate) -> float | None:
+    """Half the log of how much sharper than its prior a candidate's parameters are known (Laplace).
+
+    None where it frees what is free anyway: what that is charged is another matter.
+    """
+    own = np.array([wide.bench.parameters.index_of(q.name) for q in candidate.parameters])
+    if np.isin(own, base).any():
+        return None
+    cross = full.information[np.ix_(base, own)]
+    taken = np.stack([_solve(full.information[np.ix_(base, base)], column) for column in cross.T], axis=1)
+    sign, log_det = np.linalg.slogdet(full.information[np.ix_(own, own)] - cross.T @ taken)
+    return 0.5 * float(log_det) if sign > 0 else None
 
 
 def _with(candidate: Candidate, column: dict[str, int]):  # type: ignore[no-untyped-def]

@@ -53,7 +53,7 @@ MEANT = 3.0
 AT_NOISE = 1.05
 RIVAL = 10.0
 #: Share of what was left up to which a hypothesis, after its first steps, is fitted to its end at once.
-ALMOST = 0.05
+ALMOST = 0.15
 #: Hypotheses that are tried on top of another one, which leaves something.
 FURTHER = 4
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
@@ -314,7 +314,7 @@ def begun(
     """
     out: list[Trial] = []
     reached, nearly, kept, done, enough = 0.0, 0.0, 0.0, False, False
-    rings = gives_way(problem.bench.parameters.model)
+    rings, very_far = gives_way(problem.bench.parameters.model), misfit(evaluation) > VERY_FAR
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
         most = max((p.gain for p in worthy), default=0.0)
@@ -335,7 +335,7 @@ def begun(
             # Another one took away all there was: what changes the model, and promised less, is no likelier
             continue
         if far and promise.candidate.build is not None and (enough or promise.gain < CLOSE * reached):
-            # Another one left nothing already, and much more was expected of it, or it was not the first
+            # Another one left nothing already, and much more was expected of it, or that is no chance
             continue
         if far and promise.gain < CLOSE * nearly and slow(promise.candidate):
             # Another one left next to nothing, and much more was expected of it
@@ -356,7 +356,8 @@ def begun(
             done = done or excess(trial.evaluation) < BEATEN
             if far and _at_noise(trial):
                 reached = max(reached, promise.gain)
-                enough = promise is not worthy[0]
+                # Where so much was left two that leave nothing at all are one too many to be looked for
+                enough = promise is not worthy[0] or (very_far and not _shows(trial.evaluation))
     if instead is not None and not any(_at_noise(t) for t in out):
         found = instead()
         return out if found is None else [found]
