@@ -162,11 +162,7 @@ def trials(
     tried: list[Trial] = []
     if not far or (promises and promises[0].share > DIRECT):
         worthy = _worth_it(promises, count, seen, far)
-        tried = begun(here, seen, worthy, far, notify, budget, instead if far else None)
-    elif (lawful := instead()) is not None:
-        tried = [lawful]
-    if tried and tried[0].candidate.effect == "unknown":
-        return Trials(tried)
+        tried = begun(here, seen, worthy, far, notify, budget)
     if far and more and not any(_at_noise(t) for t in tried):
         lead = leading(tried, seen, candidates, mass, notify, budget)
         if lead is not None:
@@ -189,7 +185,10 @@ def trials(
             worthy = [p for p in far_promises(here, seen, promises, mass) if p.candidate.label not in known]
             known |= {p.candidate.label for p in worthy}
             worthy += [p for p in worth_a_fit(promises, count) if p.candidate.label not in known]
-            tried += begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify, budget)
+            further = begun(here, seen, sorted(worthy, key=lambda p: -p.gain), True, notify, budget, instead)
+            if further and further[0].candidate.effect == "unknown":
+                return Trials(further)
+            tried += further
         if not any(_at_noise(t) for t in tried) and not gives_way(problem.bench.parameters.model):
             tried += begun(here, seen, ringing_like(here, tried, seen, mass), True, notify, budget)
     if not far and not _without_support(tried, seen):
@@ -309,8 +308,8 @@ def begun(
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance.
 
-    instead: what is tried, and is the only one if it is found, where nothing that is fitted soon leaves only
-    noise, before what is fitted slowly.
+    instead: what is tried, and is the only one if it is found, where nothing that is fitted soon or promises
+    the larger part leaves only noise, before what is fitted slowly and promises less.
     """
     out: list[Trial] = []
     reached, nearly, kept, done, enough = 0.0, 0.0, 0.0, False, False
@@ -340,7 +339,8 @@ def begun(
         if far and promise.gain < CLOSE * nearly and slow(promise.candidate):
             # Another one left next to nothing, and much more was expected of it
             continue
-        if instead is not None and promise.candidate.build is not None and not any(_at_noise(t) for t in out):
+        chief = promise.candidate.build is None or promise.share > CHIEF
+        if instead is not None and not chief and not any(_at_noise(t) for t in out):
             found, instead = instead(), None
             if found is not None:
                 return [found]
@@ -358,7 +358,7 @@ def begun(
                 reached = max(reached, promise.gain)
                 # Where so much was left two that leave nothing at all are one too many to be looked for
                 enough = promise is not worthy[0] or (very_far and not _shows(trial.evaluation))
-    if instead is not None and not any(_at_noise(t) for t in out):
+    if instead is not None and not any(_at_noise(t) for t in out) and not budget.spent():
         found = instead()
         return out if found is None else [found]
     return out
