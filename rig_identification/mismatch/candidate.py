@@ -35,7 +35,6 @@ class Candidate:
     #: where their fits start
     closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
     curved: bool = False  # its amounts bend the valleys of a fit: a force by a power of the motion
-    experiment: str = ""  # what would tell it from its rivals
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property

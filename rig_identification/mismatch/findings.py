@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from rig_identification.estimate.identify import parameter_estimates
+from rig_identification.mismatch.candidate import Told
+from rig_identification.mismatch.experiments import experiment_for
 from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Finding
 
@@ -30,7 +33,7 @@ def finding(
     return Finding(
         candidate.effect,
         where,
-        {name: {"value": float(v), "std": float(s), "unit": unit} for name, (v, s, unit) in told.items()},
+        _written(told),
         dict(evidence),
         f"{sentence} {candidate.advice}",
     )
@@ -38,9 +41,16 @@ def finding(
 
 def rival(trial: Trial, first: Trial) -> dict[str, object]:
     """An entry of ``alternatives``: a hypothesis that the likeliest one, ``first``, beat."""
+    estimates = parameter_estimates(trial.problem, trial.evaluation)
+    values, stds = {p.name: p.value for p in estimates}, {p.name: p.std for p in estimates}
     return {
         "effect": trial.candidate.effect,
         "where": dict(trial.candidate.where),
         "log_likelihood_gap": float(first.evidence - trial.evidence),
-        "experiment": trial.candidate.experiment or first.candidate.experiment,
+        "parameters": _written(trial.candidate.told(values, stds)),
+        "experiment": experiment_for(trial.candidate.effect),
     }
+
+
+def _written(told: Told) -> dict[str, dict[str, object]]:
+    return {name: {"value": float(v), "std": float(s), "unit": unit} for name, (v, s, unit) in told.items()}

@@ -12,6 +12,7 @@ from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
+from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -39,10 +40,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:
         kept, fitted, explanation = (), ideal.fitted, ideal.mismatch.explanation
-        partly: list[dict[str, object]] = [
-            {"effect": t.candidate.effect, "where": dict(t.candidate.where), "log_likelihood_gap": 0.0}
-            for t in search.found
-        ]
+        partly = [rival(t, t) for t in search.found]
         rivals = (*partly, *search.rivals)
         if partly:
             named = ", ".join(str(p["effect"]) for p in partly)

@@ -180,16 +180,14 @@ def rider_candidate(
             out[f"position_{a}"] = (values[key], stds[key], "m")
         return out
 
-    thing, advice, experiment = {
+    thing, advice = {
         "liquid_slosh": (
             "A liquid swings in a tank:",
             "Fill the tank to the brim or empty it.",
-            "measure again with the tank full or empty",
         ),
         "sprung_mass": (
             f"A part moves on springs along {swing.directions}:",
             "Block the springs or take the part off.",
-            "measure again with the part blocked; a liquid would swing to both sides",
         ),
     }[effect]
     candidate = Candidate(
@@ -201,7 +199,6 @@ def rider_candidate(
         positive=1,
         tell=told,
         build=build,
-        experiment=experiment,
     )
     values = {f"{effect}.mass": found}
     values |= {f"{effect}.position.{a}": float(at[i]) for i, a in enumerate(AXES)}

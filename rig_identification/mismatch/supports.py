@@ -117,7 +117,6 @@ def ceiling_candidate(
         positive=1,
         tell=told,
         build=build,
-        experiment="hang a known weight from the ceiling beside the rig and watch the hinges sink",
     )
 
 
@@ -171,7 +170,6 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:
         tell=told,
         build=build,
         settle=stretched,
-        experiment="measure how far hinges and ceiling sink under a known weight",
     )
 
 

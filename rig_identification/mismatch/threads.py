@@ -62,7 +62,6 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
             "from hinges.",
             {"channel": None, "axis": "z"},
             name_in_result="cubic_moment",
-            experiment="small turns, or the same ones in which a plate of known size turns along",
         ),
     ]
     line = _line_of_hinges(rig)

@@ -33,6 +33,17 @@ class FindingView:
 
 
 @dataclass(frozen=True)
+class AlternativeView:
+    """One explanation that was not told, written out."""
+
+    effect: str
+    where: str
+    amount: str  # of its first parameter, with its half-width
+    gap: str  # how much less likely it is, in log likelihood
+    experiment: str
+
+
+@dataclass(frozen=True)
 class Shift:
     """One of the ten numbers in the ideal model and with the findings in it."""
 
@@ -46,13 +57,9 @@ def finding_views(mismatch: Mismatch) -> list[FindingView]:
     return [_view(finding, index) for index, finding in enumerate(mismatch.findings, start=1)]
 
 
-def alternative_rows(mismatch: Mismatch) -> list[tuple[str, str]]:
-    """Effect and how much less likely it is, in log likelihood."""
-    rows = []
-    for alternative in mismatch.alternatives:
-        gap = alternative.get("log_likelihood_gap")
-        rows.append((_words(str(alternative.get("effect", ""))), _number(gap)))
-    return rows
+def alternative_views(mismatch: Mismatch) -> list[AlternativeView]:
+    """Write out what else it could be."""
+    return [_alternative(alternative) for alternative in mismatch.alternatives]
 
 
 def shifts(identification: Identification) -> list[Shift]:
@@ -84,6 +91,22 @@ def _view(finding: Finding, index: int) -> FindingView:
         gain=_number(finding.evidence.get("log_likelihood_gain")),
         before=_finite(finding.evidence.get("holdout_error_before")),
         after=_finite(finding.evidence.get("holdout_error_after")),
+    )
+
+
+def _alternative(alternative: Mapping[str, object]) -> AlternativeView:
+    where, parameters = alternative.get("where"), alternative.get("parameters")
+    places = where.values() if isinstance(where, Mapping) else ()
+    amount = ""
+    if isinstance(parameters, Mapping) and parameters:
+        name, value, half, unit = _parameter(*next(iter(parameters.items())))
+        amount = f"{name} {value} ± {half} {unit}" if half else f"{name} {value} {unit}"
+    return AlternativeView(
+        effect=_words(str(alternative.get("effect", ""))),
+        where=", ".join(str(place) for place in places if isinstance(place, str)),
+        amount=amount,
+        gap=_number(alternative.get("log_likelihood_gap")),
+        experiment=str(alternative.get("experiment") or ""),
     )
 
 

@@ -12,7 +12,7 @@ from rig_identification.recording import Session
 from rig_identification.report.channels import finite_channels, recording_views
 from rig_identification.report.determined import determinations, sensors_used
 from rig_identification.report.doubts import doubt_groups
-from rig_identification.report.findings import alternative_rows, finding_views, shifts
+from rig_identification.report.findings import alternative_views, finding_views, shifts
 from rig_identification.report.residual_views import rms_table, whiteness_views
 from rig_identification.report.rig_drawing import rig_scene, rig_svgs
 from rig_identification.report.ten_numbers import blocks
@@ -68,7 +68,7 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "rms_rows": rms_table(channels, names),
         "whiteness": [(v, whiteness_views(channels, v.name)) for v in recordings if v.role != "at rest"],
         "findings": finding_views(identification.mismatch),
-        "alternatives": alternative_rows(identification.mismatch),
+        "alternatives": alternative_views(identification.mismatch),
         "shifts": shifts(identification),
         "determinations": determinations(identification, session),
         "sensors": sensors_used(session),

@@ -1,0 +1,54 @@
+"""What the recordings neither show nor exclude is stated, and the body's interval covers it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_simulate_identify import shaken
+
+from rig_identification.mismatch.identify import identify
+from rig_identification.result import Identification
+from rig_identification.simulate import simulate_session
+
+#: kg of entrained air that gains less than chance may, and more than its prior is charged.
+AIR = 13.0
+
+
+def answer(effects: dict[str, tuple[float, ...]], seed: int) -> tuple[Identification, np.ndarray]:
+    """The answer to a session with ``effects``, and its deviation from the body in the answer's own std."""
+    spec = replace(shaken(10, 10.0), effects=effects, doubts=False)
+    session, truth = simulate_session(spec, np.random.default_rng(seed))
+    found = identify(session)
+    return found, (found.total.values - truth.elements) / np.sqrt(np.diag(found.total.covariance))
+
+
+@pytest.fixture(scope="module")
+def with_air() -> tuple[Identification, np.ndarray]:
+    return answer({"air_added_mass": (AIR,)}, 2)
+
+
+def test_air_that_gains_less_than_chance_is_stated_and_not_told(
+    with_air: tuple[Identification, np.ndarray],
+) -> None:
+    mismatch = with_air[0].mismatch
+    assert mismatch.verdict == "none"
+    assert not mismatch.findings
+    assert mismatch.alternatives[0]["effect"] == "air_added_mass"
+    assert 0.0 <= float(str(mismatch.alternatives[0]["log_likelihood_gap"])) < 3.0
+    assert "air_added_mass" in mismatch.explanation
+    assert mismatch.alternatives[0]["experiment"]
+
+
+def test_the_interval_covers_the_body_with_and_without(with_air: tuple[Identification, np.ndarray]) -> None:
+    found, deviation = with_air
+    assert np.max(np.abs(deviation)) < 3.0
+    assert any("hardly tell apart" in note for note in found.notes)
+
+
+def test_a_clean_session_states_nothing() -> None:
+    found, deviation = answer({}, 2)
+    assert found.mismatch.verdict == "none"
+    assert not found.mismatch.alternatives
+    assert np.max(np.abs(deviation)) < 3.5
