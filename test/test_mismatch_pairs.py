@@ -12,9 +12,9 @@ from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, still_promised
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.first_fits import leading
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, screen, with_reference
-from rig_identification.mismatch.search import leading
 from rig_identification.mismatch.trial import Trial, attempt, mass_of
 from rig_identification.simulate import simulate_session
 

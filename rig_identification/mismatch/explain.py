@@ -11,7 +11,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
-from rig_identification.mismatch.lawful import law_trial, lawful_instead
+from rig_identification.mismatch.lawful import law_of_pieces, lawful_instead
 from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
@@ -86,7 +86,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     near = search.whole
     fresh = replace(search, found=[], rivals=[])
     beside_push = partial(_beside_push, ideal, notify=notify, budget=budget)
-    best = named(ideal, search, notify, beside_push, law_trial)
+    best = named(ideal, search, notify, beside_push, law_of_pieces(ideal, fresh, notify))
     if best is not None and best.mismatch.verdict == "explained":
         return best
     if near:

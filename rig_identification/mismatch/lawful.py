@@ -21,6 +21,7 @@ from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.first_fits import AT_NOISE
 from rig_identification.mismatch.measured import fitting_wrench
 from rig_identification.mismatch.point_laws import (
     SEEN,
@@ -30,7 +31,7 @@ from rig_identification.mismatch.point_laws import (
     sparser,
 )
 from rig_identification.mismatch.screen import Promise, carried, extended
-from rig_identification.mismatch.search import AT_NOISE, Trials, worst_pieces
+from rig_identification.mismatch.search import Law, Trials, worst_pieces
 from rig_identification.mismatch.standing import EXPLAINED, Search
 from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, promised
 from rig_identification.mismatch.whole_runs import whole_runs
@@ -64,6 +65,19 @@ def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explai
         return None
     finding = law_finding(best.fitted, trial.candidate, best.mismatch.findings[0])
     return replace(best, mismatch=replace(best.mismatch, findings=(finding,)))
+
+
+def law_of_pieces(ideal: Ideal, search: Search, notify: Notify) -> Law:
+    """What explains the session with a law where pieces that are tried on do not refute it.
+
+    search: as it stands before anything is found.
+    """
+
+    def law(here: Problem, seen: Evaluation, needed: float) -> Explained | None:
+        trial = law_trial(here, seen, mass_of(here, seen), search.budget)
+        return lawful(ideal, search, trial, notify) if trial is not None and trial.evidence > needed else None
+
+    return law
 
 
 def lawful_instead(

@@ -11,16 +11,11 @@ from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.first_fits import AT_NOISE
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain
-from rig_identification.mismatch.lawful import lawful, lawful_instead
+from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.screen import screen
-from rig_identification.mismatch.search import (
-    AT_NOISE,
-    MOST_EFFECTS,
-    Law,
-    Trials,
-    trials,
-)
+from rig_identification.mismatch.search import MOST_EFFECTS, Law, Trials, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
@@ -56,9 +51,8 @@ def named(
             more=step + 1 < MOST_EFFECTS,
             law=None if step else law,
         )
-        if tried.done and tried.done[0].candidate.effect == "unknown":
-            told = lawful(ideal, search, tried.done[0], notify)
-            return told or named(ideal, search, notify, beside_push)
+        if tried.lawful is not None:
+            return tried.lawful
         search.screened = None
         search.liar = search.liar or tried.liar
         if not tried.done:
