@@ -27,7 +27,8 @@ def test_an_alternative_is_written_out() -> None:
     (view,) = alternative_views(Mismatch("none", "Every residual is noise.", (), (entry,)))
     assert (view.effect, view.where, view.gap) == ("air added mass", "body", "0.610")
     assert view.amount.startswith("added mass 9")
-    assert "±" in view.amount and view.amount.endswith("kg")
+    assert "±" in view.amount
+    assert view.amount.endswith("kg")
     assert view.experiment == experiment_for("air_added_mass")
 
 
