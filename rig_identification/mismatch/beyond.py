@@ -61,6 +61,11 @@ class Beyond:
         own = self._scale * self.full.gradient[self.base]
         return Columns(seen, solved, gradient - solved.T @ own)
 
+    def within(self, own: NDArray[np.int64]) -> Array:
+        """(c, c) information left of the problem's unknowns ``own`` (c,), none of them in the base."""
+        seen = self._scale[:, None] * self.full.information[np.ix_(self.base, own)]
+        return np.asarray(self.full.information[np.ix_(own, own)] - seen.T @ cho_solve(self._factor, seen))
+
     def residuals(self, columns: Columns, amounts: Array, runs: Sequence[Array]) -> list[Array]:
         """Residuals (m,) of every run after the best step with ``amounts`` (c,) of the columns ``runs``."""
         rest = self._scale * self.full.gradient[self.base] - columns.seen @ amounts

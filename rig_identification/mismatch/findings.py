@@ -33,24 +33,25 @@ def finding(
     return Finding(
         candidate.effect,
         where,
-        _written(told),
+        written(told),
         dict(evidence),
         f"{sentence} {candidate.advice}",
     )
 
 
-def rival(trial: Trial, first: Trial) -> dict[str, object]:
-    """An entry of ``alternatives``: a hypothesis that the likeliest one, ``first``, beat."""
+def rival(trial: Trial, gap: float) -> dict[str, object]:
+    """An entry of ``alternatives``: a hypothesis that trails what is told by ``gap`` nats."""
     estimates = parameter_estimates(trial.problem, trial.evaluation)
     values, stds = {p.name: p.value for p in estimates}, {p.name: p.std for p in estimates}
     return {
         "effect": trial.candidate.effect,
         "where": dict(trial.candidate.where),
-        "log_likelihood_gap": float(first.evidence - trial.evidence),
-        "parameters": _written(trial.candidate.told(values, stds)),
+        "log_likelihood_gap": float(gap),
+        "parameters": written(trial.candidate.told(values, stds)),
         "experiment": experiment_for(trial.candidate.effect),
     }
 
 
-def _written(told: Told) -> dict[str, dict[str, object]]:
+def written(told: Told) -> dict[str, dict[str, object]]:
+    """Values with their std and unit as ``result.json`` has them."""
     return {name: {"value": float(v), "std": float(s), "unit": unit} for name, (v, s, unit) in told.items()}

@@ -40,7 +40,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:
         kept, fitted, explanation = (), ideal.fitted, ideal.mismatch.explanation
-        partly = [rival(t, t) for t in search.found]
+        partly = [rival(t, 0.0) for t in search.found]
         rivals = (*partly, *search.rivals)
         if partly:
             named = ", ".join(str(p["effect"]) for p in partly)

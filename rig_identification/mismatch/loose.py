@@ -27,6 +27,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.beyond import Beyond
+from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.measured import measured
 from rig_identification.mismatch.response import whitened_response
@@ -303,5 +304,4 @@ def _told(part: Loose, between: bool, gain: Gain, again: Gain, before: float | N
         "holdout_error_before": before,
         "holdout_error_after": None,
     }
-    parameters = {name: {"value": v, "std": s, "unit": unit} for name, (v, s, unit) in quantities.items()}
-    return Finding("loose_mass", where, parameters, evidence, text)
+    return Finding("loose_mass", where, written(quantities), evidence, text)

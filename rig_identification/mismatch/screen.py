@@ -109,10 +109,10 @@ def screen(
         return []
     added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
     base = free_without(wide, point, full, added, wide.bench.parameters.model.states - model.states)
-    out = [_promise(wide, point, full, base, c) for c in candidates]
-    for probe in (_promise(wide, point, full, base, c) for c in probes):
-        out += _supports(problem, mass, probe)
     beyond = Beyond(full, base, wide.bench.parameters.size)
+    out = [_promise(wide, point, beyond, c) for c in candidates]
+    for probe in (_promise(wide, point, beyond, c) for c in probes):
+        out += _supports(problem, mass, probe)
     placed = [Promise(*promise) for promise in placed_tethers(wide, full, beyond, candidates)]
     instead = {p.candidate.label for p in placed}
     out = [*(p for p in out if p.candidate.label not in instead), *placed]
@@ -140,9 +140,8 @@ def free_without(
     return np.flatnonzero(~at_bound)
 
 
-def _promise(
-    wide: Problem, point: Point, full: Evaluation, base: NDArray[np.int64], candidate: Candidate
-) -> Promise:
+def _promise(wide: Problem, point: Point, beyond: Beyond, candidate: Candidate) -> Promise:
+    full, base = beyond.full, beyond.base
     free = wide.bench.parameters.free
     column = {q.name: INERTIAL + i for i, q in enumerate(free)}
     information, gradient = full.information.copy(), full.gradient.copy()
@@ -170,20 +169,18 @@ def _promise(
         chosen = [i for i in chosen if i not in wrong]
     gain = 0.5 * float(step[index] @ gradient[index]) - _gain(full.information, full.gradient, base)
     values = {q.name: free[i - INERTIAL].value(point.theta[i] + step[i]) for q, i in _with(candidate, column)}
-    return Promise(candidate, gain, values, charge=_charge(wide, full, base, candidate))
+    return Promise(candidate, gain, values, charge=_charge(wide, beyond, candidate))
 
 
-def _charge(wide: Problem, full: Evaluation, base: NDArray[np.int64], candidate: Candidate) -> float | None:
+def _charge(wide: Problem, beyond: Beyond, candidate: Candidate) -> float | None:
     """Half the log of how much sharper than its prior a candidate's parameters are known (Laplace).
 
     None where it frees what is free anyway: what that is charged is another matter.
     """
     own = np.array([wide.bench.parameters.index_of(q.name) for q in candidate.parameters])
-    if np.isin(own, base).any():
+    if np.isin(own, beyond.base).any():
         return None
-    cross = full.information[np.ix_(base, own)]
-    taken = np.stack([_solve(full.information[np.ix_(base, base)], column) for column in cross.T], axis=1)
-    sign, log_det = np.linalg.slogdet(full.information[np.ix_(own, own)] - cross.T @ taken)
+    sign, log_det = np.linalg.slogdet(beyond.within(own))
     return 0.5 * float(log_det) if sign > 0 else None
 
 

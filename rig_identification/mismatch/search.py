@@ -16,7 +16,7 @@ import numpy as np
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, supports
-from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.first_fits import (
@@ -93,7 +93,7 @@ def trials(
     limit: float,
     notify: Notify,
     screened: list[Promise] | None = None,
-    budget: Budget | None = None,
+    budget: Budget = UNLIMITED,
     more: bool = False,
     law: Law | None = None,
 ) -> Trials:
@@ -112,9 +112,7 @@ def trials(
         problem, evaluation = worst_pieces(problem, evaluation)
     promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
-    look = _Look(
-        problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget or Budget(), law
-    )
+    look = _Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
     if not far or (promises and promises[0].share > DIRECT):
         look.directly()
     if far and more and not look.at_noise:

@@ -44,13 +44,15 @@ class Search:
     def adopt(self, tried: Trials, chosen: Trial) -> None:
         """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals."""
         self.found.append(chosen)
-        others = [t for t in tried.done if t is not chosen and t.evidence <= chosen.evidence]
-        self.rivals += [rival(t, chosen) for t in others]
+        others = [
+            (chosen.evidence - t.evidence, t)
+            for t in tried.done
+            if t is not chosen and t.evidence <= chosen.evidence
+        ]
+        self.rivals += [rival(t, gap) for gap, t in others]
         self.bodies = ()
         if self.whole:
-            self.bodies = tuple(
-                (chosen.evidence - t.evidence, inertial_estimate(t.problem, t.evaluation)) for t in others
-            )
+            self.bodies = tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in others)
         self.here, self.evaluation = adopted(self.here, self.evaluation, chosen)
 
 

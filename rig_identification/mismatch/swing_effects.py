@@ -98,7 +98,11 @@ class Choice:
     @property
     def rivals(self) -> tuple[dict[str, object], ...]:
         """What by itself would damp less well than the likeliest does, and is not in the model."""
-        return tuple(rival(t, self.alone[0]) for t in self.alone[1:] if t.candidate not in self.chosen)
+        return tuple(
+            rival(t, self.alone[0].evidence - t.evidence)
+            for t in self.alone[1:]
+            if t.candidate not in self.chosen
+        )
 
 
 def damped(

@@ -64,7 +64,7 @@ def undecided(
     mismatch = replace(
         ideal.mismatch,
         explanation=f"{ideal.mismatch.explanation} Whether there is {named} they neither show nor exclude.",
-        alternatives=tuple({**rival(t, t), "log_likelihood_gap": gap} for gap, t in stated),
+        alternatives=tuple(rival(t, gap) for gap, t in stated),
     )
     bodies = tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in stated)
     return Explained(ideal.fitted, mismatch, ideal, bodies=bodies)
