@@ -159,6 +159,23 @@ def _channel(
     return Channel(device, quantity, columns, unit, time, values, std, estimated, group, node)
 
 
+def heard_apart(rig: Rig, part: Run) -> Run:
+    """A stretch of a run with the noise of its own samples, where what it was cut from sounds louder."""
+    channels = []
+    for c in part.channels:
+        name = f"mocap_{c.quantity}" if c.device == "mocap" else c.quantity
+        own, estimated = noise_std(rig, name, c.time, c.values)
+        quieter = own < c.noise
+        channels.append(
+            replace(
+                c,
+                noise=np.where(quieter, own, c.noise),
+                noise_estimated=estimated if np.all(quieter) else c.noise_estimated,
+            )
+        )
+    return replace(part, channels=tuple(channels))
+
+
 def _mocap_series(series: Series) -> tuple[Series, Array]:
     """Pose as position and rotation vector about the mean orientation, and that mean (3, 3)."""
     turns = Rotation.from_quat(series.values[:, 3:])

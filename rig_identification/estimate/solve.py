@@ -341,7 +341,7 @@ CREEP, CREPT = 0.01, 4
 
 #: Gain (nats) that a full step may still promise where no step keeps it: the optimum is then within half a
 #: standard deviation.
-CLOSE = 0.1
+CLOSE = 0.125
 
 
 def _as_good_as_settled(problem: Problem, current: Evaluation) -> bool:

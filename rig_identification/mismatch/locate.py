@@ -170,9 +170,12 @@ def find_event(problem: Problem, evaluation: Evaluation, alone: bool = True) -> 
     if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
         return None
     first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
-    within = [i for i in range(count) if problem.runs[i].recording.name in names]
-    if not alone and (bad[0] == within[0] or bad[-1] == within[-1]):
-        # What is large at first and dies away, or grows, is no event
-        return None
     calm = tuple(i for i in range(count) if i not in bad)
-    return Event(names.pop(), first.offset, last.offset + last.grid.duration, point, calm)
+    event = Event(names.pop(), first.offset, last.offset + last.grid.duration, point, calm)
+    return None if not alone and at_an_end(event, problem) else event
+
+
+def at_an_end(event: Event, problem: Problem) -> bool:
+    """Whether an event takes a recording's first or last piece: what dies away, or grows, does so too."""
+    within = [i for i, run in enumerate(problem.runs) if run.recording.name == event.recording]
+    return within[0] not in event.calm or within[-1] not in event.calm

@@ -14,6 +14,7 @@ from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.first_fits import AT_NOISE
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain
 from rig_identification.mismatch.lawful import lawful_instead
+from rig_identification.mismatch.push import push_too
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import MOST_EFFECTS, Law, Trials, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
@@ -66,7 +67,7 @@ def named(
             # A push among pieces that all lack something stands out with that in the model
             beside = None
             if beside_push is not None and not search.whole and not search.budget.spent():
-                beside = beside_push(search.here, search.evaluation)
+                beside = push_too(ideal, search, notify) or beside_push(search.here, search.evaluation)
             if beside is not None:
                 return beside
             if search.share < CHIEF:
@@ -78,6 +79,10 @@ def named(
         best = whole_runs(ideal, search)
         if _wholly(best):
             return pruned(best, search, len(candidates))
+        if beside_push is not None and not search.whole and not search.budget.spent():
+            pushed = push_too(ideal, search, notify)
+            if pushed is not None:
+                return pushed
         if law is not None and not step and not before.whole and not search.budget.spent():
             notify("search: a force that follows one point's motion", at)
             told = lawful_instead(ideal, before, notify, first)

@@ -12,9 +12,11 @@ from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
-from rig_identification.mismatch.locate import CALM, Event, find_event
+from rig_identification.mismatch.locate import CALM, Event, at_an_end, find_event
+from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
+from rig_identification.mismatch.whole_runs import whole_runs
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
@@ -79,6 +81,25 @@ def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event 
         return None
     notify("search: a push beside something else", 0.06)
     return find_event(here, evaluation, alone=False)
+
+
+def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
+    """What was found, and a push that it leaves in short pieces; None where it leaves more, or no push.
+
+    With the effects in the model all other pieces are noise, and so is all of every run outside the push.
+    """
+    squares = [float(np.mean(run.residual**2)) for run in search.evaluation.runs]
+    if np.median(squares) > CALM:
+        return None
+    notify("search: a push beside " + ", ".join(t.candidate.label for t in search.found), 0.6)
+    event = find_event(search.here, search.evaluation)
+    if event is None or at_an_end(event, search.here):
+        return None
+    runs = _all_without(search.problem.runs, event, event.start, event.end)
+    found = whole_runs(ideal, replace(search, problem=replace(search.problem, runs=runs)))
+    if found.mismatch.verdict != "explained" or found.trace:
+        return None
+    return with_push(found, ideal, search.here, event)
 
 
 def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.evidence import Run, heard_apart
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.rods import FEW, pushes, reads_nothing
@@ -60,7 +60,8 @@ def slack_spells(run: Run, zero: float) -> list[Spell]:
             continue
         tension = c.values[:, 0]
         limit = reads_nothing(c, zero)
-        if limit > USUAL * float(np.median(tension)) or pushes(c, zero):
+        # The mean carries the weight however long the cable hangs loose; the median does not
+        if limit > USUAL * float(np.mean(tension)) or pushes(c, zero):
             continue
         loose = np.flatnonzero(tension < limit)
         if loose.size < FEW:
@@ -140,8 +141,33 @@ def slack_finding(spells: list[Spell]) -> Finding:
 def spells_of(fitted: Fitted) -> list[Spell]:
     """Slack spells of all runs of a session."""
     zeros = [p.prior_std for p in fitted.problem.bench.parameters.free if p.name.endswith("load_cell_zero")]
-    runs = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
+    runs = _quietened((*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost), fitted)
     return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
+
+
+def _quietened(runs: tuple[Run, ...], fitted: Fitted) -> list[Run]:
+    """The runs, each load cell as noisy as where it is quietest.
+
+    A cable that hangs loose half the time and snaps makes its own cell look so noisy that nothing is left
+    which that cell would read as nothing.
+    """
+    heard = [c for run in runs for c in run.channels] + [
+        c for rest in fitted.problem.rests for c in rest.channels
+    ]
+    quietest: dict[str, float] = {}
+    for c in heard:
+        if c.quantity == "tension":
+            quietest[c.device] = min(float(c.noise[0]), quietest.get(c.device, np.inf))
+    return [
+        replace(
+            run,
+            channels=tuple(
+                replace(c, noise=np.array([quietest[c.device]])) if c.quantity == "tension" else c
+                for c in run.channels
+            ),
+        )
+        for run in runs
+    ]
 
 
 def blows(runs: tuple[Run, ...], spells: list[Spell]) -> list[Spell]:
@@ -170,8 +196,12 @@ def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | Non
     fitted = ideal.fitted
     every = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
     loose = [*spells, *blows(every, spells)]
-    runs = tuple(part for run in fitted.problem.runs for part in taut_stretches(run, loose))
-    held = tuple(part for run in (*fitted.holdout_runs, *fitted.lost) for part in taut_stretches(run, loose))
+
+    def taut(cut: tuple[Run, ...]) -> tuple[Run, ...]:
+        rig = fitted.problem.bench.rig
+        return tuple(heard_apart(rig, part) for run in cut for part in taut_stretches(run, loose))
+
+    runs, held = taut(fitted.problem.runs), taut((*fitted.holdout_runs, *fitted.lost))
     if not runs:
         return None
     return fit_again(ideal, runs, held, notify)
