@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
-from rig_identification.estimate.whitening import smooth, whiten
+from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
 from rig_identification.model.motion import FIT_STEP, Input, Motion, RigModel, State, simulate, substeps_for
@@ -136,6 +137,16 @@ class Linearised:
     def cost(self) -> float:
         """Negative log likelihood less a constant."""
         return 0.5 * float(self.residual @ self.residual) + self.log_spread
+
+    @cached_property
+    def filter(self) -> tuple[Array, Array]:
+        """How wrenches to come are whitened: gains and standard deviations (whitening.filter_of)."""
+        if not np.any(self.Q):
+            # Nothing moves the body but what is known: no sample tells anything of the next one
+            return np.zeros((self.nodes.size, self.row_H.shape[1] + 6)), np.sqrt(self.variance)
+        A, B, _, _, _ = self.motion.derivatives
+        gains, deviations = filter_of(A, B, self.Q, self.nodes, self.row_H, self.row_D, self.variance)
+        return np.asarray(gains), np.asarray(deviations)
 
 
 def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:

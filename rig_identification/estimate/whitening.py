@@ -91,6 +91,44 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
+def filter_of(A, B, Q, node, H, D, variance):  # type: ignore[no-untyped-def]
+    """The filter of :func:`whiten` for columns to come.
+
+    Returns (m, X + 6) what an innovation of one standard deviation moves state and wrench by, and (m,) the
+    standard deviations.
+    """
+    states = A.shape[1]
+    size = states + 6
+    gains, deviations = np.zeros((node.shape[0], size)), np.empty(node.shape[0])
+    P = np.zeros((size, size))
+    h, gain, F = np.empty(size), np.empty(size), np.empty((states, size))
+    row = 0
+    for k in range(A.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                P[states + i, states + j] = Q[k, i, j]
+            for j in range(states):
+                P[states + i, j] = 0.0
+                P[j, states + i] = 0.0
+        while row < node.shape[0] and node[row] == k:
+            h[:states] = H[row]
+            h[states:] = D[row]
+            gain[:] = np.dot(P, h)
+            spread = variance[row] + np.dot(h, gain)
+            deviations[row] = np.sqrt(spread)
+            for i in range(size):
+                gains[row, i] = gain[i] / deviations[row]
+                for j in range(size):
+                    P[i, j] -= gain[i] * gain[j] / spread
+            row += 1
+        F[:, :states] = A[k]
+        F[:, states:] = B[k]
+        after = np.dot(np.dot(F, P), F.T)
+        P[:states, :states] = 0.5 * (after + after.T)
+    return gains, deviations
+
+
+@njit(cache=True, nogil=True)
 def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ignore[no-untyped-def]
     """Best correction of the nominal motion by noise that enters as force, given the whole run.
 

@@ -16,7 +16,9 @@ catalogue, and in runs that were held out it does so again, with the same travel
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numba import njit
@@ -48,8 +50,12 @@ FINE = 8
 TRAVELS, RATES, STOPS, RATIOS = (0.002, 0.1), (0.05, 8.0), (10.0, 80.0), (0.05, 0.9)
 BOUNDS = [(np.log(a), np.log(b)) for a, b in (TRAVELS, RATES, STOPS, RATIOS)] + [(-REACH, REACH)] * 3
 #: Differential evolution (Storn & Price, J. Global Optimization 11, 1997): members for each number that is
-#: looked for, generations. Then steps of a simplex on what the part really gains.
-PEOPLE, GENERATIONS, POLISHED = 12, 60, 60
+#: looked for, generations, and how often anew. Of each scan's last members so many are heard for what they
+#: really gain; and from the best few of all, which differ by this much, steps of a simplex on that, and more
+#: of them from where the best of these comes to.
+PEOPLE, GENERATIONS, SEEDS, HEARD = 12, 60, (1, 2), 8
+STARTS, POLISHED = 3, (100, 200)
+ALIKE = np.array([0.25, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0])
 #: First steps of the simplex: in the logarithms, and in the place.
 NUDGES = (0.03, 0.2, 0.3, 0.3, 0.15, 0.15, 0.15)
 #: Std of a travel that blows were timed by, and of a mass that they tell, as a share of each: blows that come
@@ -211,7 +217,11 @@ class Along:
 
 
 def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
-    """The part that takes most away. middle (3,) m, spread m: about where it is looked for."""
+    """The part that takes most away. middle (3,) m, spread m: about where it is looked for.
+
+    What a part looks like is asked of ever so many, what it takes away of the likeliest of them; and from the
+    best of these that are not one and the same a simplex goes on.
+    """
 
     def part(axis: str, x: Array) -> Loose:
         travel, rate, stop, ratio = np.exp(np.clip(x[:4], *np.array(BOUNDS[:4]).T))
@@ -220,29 +230,56 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
     def away(x: Array) -> float:
         return 0.5 * float(x[4:] @ x[4:])
 
-    def nearest(axis: str) -> tuple[float, str, Array]:
+    def left(axis: str, x: Array) -> float:
+        return away(x) - along.gain(part(axis, x)).nats
+
+    def scanned(where: tuple[str, int]) -> list[_Guess]:
+        axis, seed = where
         found = differential_evolution(
             lambda x: away(x) - along.likeness(part(axis, x)),
             BOUNDS,
             popsize=PEOPLE,
             maxiter=GENERATIONS,
-            seed=1,
+            seed=seed,
             polish=False,
         )
-        return float(found.fun), axis, np.asarray(found.x)
+        best = found.population[np.argsort(found.population_energies)[:HEARD]]
+        return [_Guess(left(axis, x), axis, x) for x in best]
 
-    _, axis, x = min((nearest(axis) for axis in AXES), key=lambda found: found[0])
-    polished = minimize(
-        lambda x: away(x) - along.gain(part(axis, x)).nats,
-        x,
-        method="Nelder-Mead",
-        options={
-            "maxfev": POLISHED,
-            "initial_simplex": x + np.vstack([np.zeros(len(NUDGES)), np.diag(NUDGES)]),
-        },
-    )
-    chosen = part(axis, np.asarray(polished.x))
+    def polished(guess: _Guess, steps: int) -> _Guess:
+        corners = guess.x + np.vstack([np.zeros(len(NUDGES)), np.diag(NUDGES)])
+        found = minimize(
+            lambda x: left(guess.axis, x),
+            guess.x,
+            method="Nelder-Mead",
+            options={"maxfev": steps, "initial_simplex": corners},
+        )
+        return _Guess(float(found.fun), guess.axis, np.asarray(found.x))
+
+    # What takes the time holds no lock, and no thread tells another what it found: the same every time
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        every = [g for found in pool.map(scanned, product(AXES, SEEDS)) for g in found]
+        guesses: list[_Guess] = []
+        for guess in sorted(every, key=lambda g: g.left):
+            if len(guesses) < STARTS and not any(guess.like(known) for known in guesses):
+                guesses.append(guess)
+        best = min(pool.map(lambda g: polished(g, POLISHED[0]), guesses), key=lambda g: g.left)
+    best = polished(best, POLISHED[1])
+    chosen = part(best.axis, best.x)
     return chosen, along.gain(chosen)
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A part as the scan writes it: logarithms of its four numbers, and its place in spreads."""
+
+    left: float  # nats less than nothing
+    axis: str
+    x: Array  # (7,)
+
+    def like(self, other: _Guess) -> bool:
+        """Whether a simplex from either would look at much the same."""
+        return self.axis == other.axis and bool(np.all(np.abs(self.x - other.x) < ALIKE))
 
 
 def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:

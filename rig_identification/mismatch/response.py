@@ -2,7 +2,8 @@
 
 Between nodes x_{k+1} = A_k x_k + B_k w_k, w_k being the interval's mean, and a sample at node k reads
 H x_k + D w_k: whatever acts as a wrench can be screened by one pass of this recursion, without running the
-model again.
+model again. What the run's filter (estimate/whitening.py) has seen of it, state and wrench, is taken away as
+it goes: only what is unseen yet is carried on, and what a sample sees of that is its normalised innovation.
 """
 
 from __future__ import annotations
@@ -12,34 +13,51 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rig_identification.estimate.prediction import Linearised
-from rig_identification.estimate.whitening import whiten
 
 Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def _respond(A, B, node, H, D, wrenches, smooth, out):  # type: ignore[no-untyped-def]
-    """out (m, c): response of each row to ``wrenches`` (N, 6, c)."""
-    states, count = A.shape[1], wrenches.shape[2]
-    X = np.zeros((states, count))
+def _innovations(A, B, node, H, D, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
+    """out (m, c): normalised innovations of the responses to ``wrenches`` (N, 6, c).
+
+    gains (m, X + 6), deviations (m,): the run's filter.
+    """
+    nodes, states, count = A.shape[0], A.shape[1], wrenches.shape[2]
+    size = states + 6
+    unseen, after = np.zeros((size, count)), np.empty((states, count))
+    seen = np.empty(count)
+    F = np.empty((states, size))
     row = 0
-    for k in range(A.shape[0]):
-        while row < node.shape[0] and node[row] == k:
+    for k in range(nodes):
+        for i in range(6):
             for c in range(count):
-                out[row, c] = 0.0
-            for i in range(states):
-                h = H[row, i]
+                unseen[states + i, c] = wrenches[k, i, c]
+        while row < node.shape[0] and node[row] == k:
+            seen[:] = 0.0
+            for i in range(size):
+                h = H[row, i] if i < states else D[row, i - states]
                 if h != 0.0:
                     for c in range(count):
-                        out[row, c] += h * X[i, c]
-            for i in range(6):
-                h = D[row, i]
-                if h != 0.0:
+                        seen[c] += h * unseen[i, c]
+            for c in range(count):
+                seen[c] /= deviations[row]
+                out[row, c] = seen[c]
+            for i in range(size):
+                g = gains[row, i]
+                if g != 0.0:
                     for c in range(count):
-                        out[row, c] += h * wrenches[k, i, c]
+                        unseen[i, c] -= g * seen[c]
             row += 1
-        after = wrenches[min(k + 1, wrenches.shape[0] - 1)] if smooth else wrenches[k]
-        X = np.dot(A[k], X) + np.dot(B[k], 0.5 * (wrenches[k] + after))
+        if smooth:
+            ahead = min(k + 1, nodes - 1)
+            for i in range(6):
+                for c in range(count):
+                    unseen[states + i, c] += 0.5 * (wrenches[ahead, i, c] - wrenches[k, i, c])
+        F[:, :states] = A[k]
+        F[:, states:] = B[k]
+        after[:, :] = np.dot(F, unseen)
+        unseen[:states] = after
 
 
 def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False) -> Array:
@@ -49,14 +67,7 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     node instead, and what follows a motion is not half an interval late.
     """
     A, B, _, _, _ = run.motion.derivatives
-    columns = np.empty((run.nodes.size, wrenches.shape[2] + 1))
-    columns[:, 0] = run.plain
-    response = np.empty((run.nodes.size, wrenches.shape[2]))
+    out = np.empty((run.nodes.size, wrenches.shape[2]))
     held = np.ascontiguousarray(wrenches)
-    _respond(A, B, run.nodes, run.row_H, run.row_D, held, smooth, response)
-    columns[:, 1:] = response
-    if np.any(run.Q):
-        whiten(A, B, run.Q, run.latent, run.nodes, run.row_H, run.row_D, run.variance, columns)
-    else:
-        columns /= np.sqrt(run.variance)[:, None]
-    return columns[:, 1:]
+    _innovations(A, B, run.nodes, run.row_H, run.row_D, *run.filter, held, smooth, out)
+    return out
