@@ -94,12 +94,12 @@ def solve_cautiously(parts: Problem, point: Point) -> tuple[Problem, Evaluation]
     Weights start from the residuals at ``point`` and follow them down, so that what the model
     lacks is never large against the weights and bends nothing on the way.
     """
-    current = evaluate(parts, point)
+    current = evaluate(parts, point, residuals_only=True)
     if current is None:
         return parts, solve(parts, point, iterations=ROUNDS * STEPS)[0]
     weighed, evaluation = parts, current
     for _ in range(ROUNDS):
         weighed = reweighted(parts, current)
         evaluation, _ = solve(weighed, current.point, iterations=STEPS, tolerance=0.5)
-        current = evaluate(parts, evaluation.point) or current
+        current = evaluate(parts, evaluation.point, residuals_only=True) or current
     return weighed, evaluation

@@ -8,6 +8,7 @@ the shorter one's result, whose remaining error is already far inside the next b
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -115,11 +116,13 @@ def solve_growing(
 
 def settled_starts(problem: Problem, point: Point) -> tuple[State, ...]:
     """Start states that fit best with everything else as it is at ``point``."""
-    starts = []
-    for run, start in zip(problem.runs, point.starts, strict=True):
+
+    def settled(run: Run, start: State) -> State:
         found = fit_start(problem.bench, run, point.theta, start, tolerance=0.1, polish=POLISH)
-        starts.append(start if found is None else found[1])
-    return tuple(starts)
+        return start if found is None else found[1]
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        return tuple(pool.map(settled, problem.runs, point.starts))
 
 
 def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tuple[Linearised, State] | None:

@@ -15,7 +15,7 @@ from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
 from rig_identification.estimate.first_guess import first_elements, mocap_mount, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
-from rig_identification.estimate.launch import REGRESSED, Launch, launch_state, tracked
+from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, invert_information
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
@@ -147,7 +147,7 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     notes = tuple(_note(name, part) for name, part in parts.items() if part.held)
     runs = tuple(free[run.recording.name] for run in problem.runs)
     problem = replace(problem, runs=runs)
-    starts = tuple(launch_state(problem.bench, run, theta, found.rest) for run in runs)
+    starts = launch_states(problem.bench, runs, theta, found.rest)
     point = Point(theta, starts, (found.rest,) * len(problem.rests))
     held = tuple(free[run.recording.name] for run in held)
     return Start(problem, point, found.rest, held, notes, by_hand)
@@ -386,7 +386,7 @@ def fit_again(ideal: Ideal, runs: tuple[Run, ...], held: tuple[Run, ...], notify
     fitted = ideal.fitted
     problem = replace(fitted.problem, runs=runs)
     point = fitted.guess or fitted.evaluation.point
-    starts = tuple(launch_state(problem.bench, run, point.theta, fitted.rest) for run in runs)
+    starts = launch_states(problem.bench, runs, point.theta, fitted.rest)
     start = Start(problem, replace(point, starts=starts), fitted.rest, held, fitted.notes, fitted.held_parts)
     again = fit_from(start, notify)
     found = Ideal(again, *judged(again))

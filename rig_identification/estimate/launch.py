@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -122,6 +123,12 @@ def launch_state(
         closer = _launched(bench, run, theta, start, noise, doubted, CLOSER + LAUNCHES)
         state = closer[0] if closer[1] < square else state
     return state
+
+
+def launch_states(bench: Bench, runs: tuple[Run, ...], theta: Array, rest: State) -> tuple[State, ...]:
+    """Start states of several runs, two at a time."""
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        return tuple(pool.map(lambda run: launch_state(bench, run, theta, rest), runs))
 
 
 def _launched(

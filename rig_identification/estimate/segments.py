@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.launch import launch_state, launch_states
 from rig_identification.estimate.sampling import LOCAL, sample_noise_std
 from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
@@ -41,7 +41,7 @@ def in_pieces(
 ) -> tuple[Problem, Point]:
     """The same problem with every run in pieces, and a point with a start state for each."""
     cut = tuple(piece for run in problem.runs for piece in pieces(run, length))
-    starts = tuple(launch_state(problem.bench, piece, theta, rest) for piece in cut)
+    starts = launch_states(problem.bench, cut, theta, rest)
     return replace(problem, runs=cut), Point(theta, starts, rest_guesses)
 
 
