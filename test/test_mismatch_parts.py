@@ -14,6 +14,7 @@ from test_model_rigs import thesis_case_14
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.whitening import whiten
 from rig_identification.mismatch.latent import MissingWrench, joined, strongest_push
 from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.response import whitened_response
@@ -118,6 +119,23 @@ def test_supports_change_the_model_and_nothing_else() -> None:
     assert shared[0].position(shared[0].value(0.7)) == pytest.approx(0.7)
     # A centimetre under the body's weight
     assert largest_compliance(sample.rig, 1200.0) * 1200.0 * sample.rig.gravity == pytest.approx(0.01)
+
+
+def test_a_response_is_whitened_as_the_residuals_are(
+    short: tuple[Problem, Run, Array, State],  # noqa: F811
+) -> None:
+    """One filter, worked out beforehand, does what the Kalman pass does to columns of a Jacobian."""
+    problem, run, theta, start = short
+    nominal = linearise_run(problem.bench, run, theta, start, extra_noise=np.diag([2.0] * 3 + [1.0] * 3))
+    assert nominal is not None
+    wrenches = np.random.default_rng(2).normal(size=(run.grid.nodes, 6, 3))
+    deaf = replace(nominal, Q=np.zeros_like(nominal.Q), variance=np.ones_like(nominal.variance))
+    for smooth in (False, True):
+        columns = np.column_stack([nominal.plain, whitened_response(deaf, wrenches, smooth=smooth)])
+        A, B, _, _, _ = nominal.motion.derivatives
+        at, H, D = nominal.nodes, nominal.row_H, nominal.row_D
+        whiten(A, B, nominal.Q, nominal.latent, at, H, D, nominal.variance, columns)
+        assert whitened_response(nominal, wrenches, smooth=smooth) == pytest.approx(columns[:, 1:], abs=1e-9)
 
 
 def test_a_wrench_moves_every_sample_as_running_the_model_again_does(

@@ -9,10 +9,11 @@ import pytest
 from test_estimate_prediction import recorded
 from test_model_rigs import random_sample
 
-from rig_identification.estimate.evidence import Run, prepare
+from rig_identification.estimate.evidence import Run, heard_apart, prepare
 from rig_identification.mismatch.slack import (
     Spell,
     blows,
+    quietened,
     shocks,
     slack_finding,
     slack_spells,
@@ -54,6 +55,24 @@ def test_a_spell_is_found_and_cut_out(run: Run) -> None:
     finding = slack_finding([spell])
     assert finding.effect == "cable_slack"
     assert finding.where["channel"] == spell.cable
+
+
+def test_a_cable_that_hangs_loose_half_the_time_is_heard_where_it_is_quiet(run: Run) -> None:
+    """It snaps so often that the noise of its own run hides that it carries nothing."""
+    loose = _with_nothing(run, 1.0, 6.0)
+    loud = replace(loose, channels=(replace(loose.channels[0], noise=np.array([60.0])), *loose.channels[1:]))
+    assert slack_spells(loud, 3.0) == []
+    at_rest = replace(run, recording=replace(run.recording, name="quiet"))
+    (spell,) = slack_spells(quietened((loud, at_rest), ())[0], 3.0)
+    assert spell.end - spell.start == pytest.approx(5.0, abs=0.05)
+
+
+def test_a_taut_stretch_has_the_noise_of_its_own_samples(run: Run) -> None:
+    session, _ = recorded(random_sample(3, 3), seed=4, duration=8.0)
+    c = run.channels[0]
+    loud = replace(run, channels=(replace(c, noise=30.0 * c.noise), *run.channels[1:]))
+    (own,) = heard_apart(session.rig, loud).channels[0].noise
+    assert own == pytest.approx(session.rig.noise["tension"])
 
 
 def test_a_rod_that_pushes_is_not_slack(run: Run) -> None:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numba import njit
@@ -63,6 +62,8 @@ NUDGES = (0.03, 0.2, 0.3, 0.3, 0.15, 0.15, 0.15)
 TIMED, WEIGHED = 0.5, 1.0
 #: Nats by which a loose part has to be likelier than all else, and by which held-out runs have to confirm it.
 AHEAD, CONFIRMED = 30.0, 10.0
+#: Share of that below which the scan's best is not followed any further.
+FAINT = 0.25
 #: Prior std of its mass, in parts of the body's, and the number of them past which it is no part of the body.
 LIKELY, FARTHEST = 0.05, 3.0
 
@@ -258,7 +259,14 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
 
     # What takes the time holds no lock, and no thread tells another what it found: the same every time
     with ThreadPoolExecutor(max_workers=2) as pool:
-        every = [g for found in pool.map(scanned, product(AXES, SEEDS)) for g in found]
+        every: list[_Guess] = []
+        for seed in SEEDS:
+            every += [g for found in pool.map(scanned, [(axis, seed) for axis in AXES]) for g in found]
+            best = min(every, key=lambda g: g.left)
+            if -best.left < FAINT * AHEAD:
+                # Nothing looks like it at all: no simplex makes so much of that
+                chosen = part(best.axis, best.x)
+                return chosen, along.gain(chosen)
         guesses: list[_Guess] = []
         for guess in sorted(every, key=lambda g: g.left):
             if len(guesses) < STARTS and not any(guess.like(known) for known in guesses):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run, heard_apart
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fit_again, judged
+from rig_identification.estimate.rest_evidence import RestEvidence
 from rig_identification.estimate.rods import FEW, pushes, reads_nothing
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
@@ -141,23 +142,21 @@ def slack_finding(spells: list[Spell]) -> Finding:
 def spells_of(fitted: Fitted) -> list[Spell]:
     """Slack spells of all runs of a session."""
     zeros = [p.prior_std for p in fitted.problem.bench.parameters.free if p.name.endswith("load_cell_zero")]
-    runs = _quietened((*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost), fitted)
+    runs = quietened((*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost), fitted.problem.rests)
     return [s for run in runs for s in slack_spells(run, max(zeros, default=0.0))]
 
 
-def _quietened(runs: tuple[Run, ...], fitted: Fitted) -> list[Run]:
-    """The runs, each load cell as noisy as where it is quietest.
+def quietened(runs: tuple[Run, ...], rests: tuple[RestEvidence, ...]) -> list[Run]:
+    """The runs, each load cell as noisy as where it is quietest, be that at rest.
 
     A cable that hangs loose half the time and snaps makes its own cell look so noisy that nothing is left
     which that cell would read as nothing.
     """
-    heard = [c for run in runs for c in run.channels] + [
-        c for rest in fitted.problem.rests for c in rest.channels
-    ]
     quietest: dict[str, float] = {}
-    for c in heard:
-        if c.quantity == "tension":
-            quietest[c.device] = min(float(c.noise[0]), quietest.get(c.device, np.inf))
+    for evidence in (*runs, *rests):
+        for c in evidence.channels:
+            if c.quantity == "tension":
+                quietest[c.device] = min(float(c.noise[0]), quietest.get(c.device, np.inf))
     return [
         replace(
             run,
