@@ -102,14 +102,11 @@ def screen(
     rig, model = problem.bench.rig, problem.bench.parameters.model
     axes = () if gives_way(model) else range(3)
     probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in axes]
-    wide = _adding(problem, [*candidates, *probes])
-    point = carried(wide, problem, evaluation.point)
-    full = evaluate(wide, point)
-    if full is None:
+    opened = _opened(problem, evaluation, [*candidates, *probes])
+    if opened is None:
         return []
-    added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
-    base = free_without(wide, point, full, added, wide.bench.parameters.model.states - model.states)
-    beyond = Beyond(full, base, wide.bench.parameters.size)
+    wide, point, beyond = opened
+    full, base = beyond.full, beyond.base
     out = [_promise(wide, point, beyond, c) for c in candidates]
     for probe in (_promise(wide, point, beyond, c) for c in probes):
         out += _supports(problem, mass, probe)
@@ -120,6 +117,46 @@ def screen(
     left = max(1.0, excess(full) - _gain(full.information, full.gradient, base))
     out = [replace(promise, share=promise.gain / left) for promise in out]
     return sorted(out, key=lambda promise: -promise.gain)
+
+
+def _opened(
+    problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
+) -> tuple[Problem, Point, Beyond] | None:
+    """The problem with what candidates add among its unknowns, and all that is free without it."""
+    wide = _adding(problem, candidates)
+    point = carried(wide, problem, evaluation.point)
+    full = evaluate(wide, point)
+    if full is None:
+        return None
+    added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
+    probed = wide.bench.parameters.model.states - problem.bench.parameters.model.states
+    base = free_without(wide, point, full, added, probed)
+    return wide, point, Beyond(full, base, wide.bench.parameters.size)
+
+
+def promises_of(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]) -> list[Promise]:
+    """Promises of ``candidates`` alone, which change numbers and not the model, in their order."""
+    opened = _opened(problem, evaluation, candidates)
+    return [] if opened is None else [_promise(*opened, c) for c in candidates]
+
+
+def together(
+    problem: Problem, evaluation: Evaluation, pairs: list[tuple[Candidate, Candidate]]
+) -> list[float]:
+    """What pairs of candidates that change numbers and not the model promise together, nats, in order."""
+    opened = _opened(problem, evaluation, list({c.label: c for pair in pairs for c in pair}.values()))
+    return [] if opened is None else [_promise(*opened, _both(*pair)).gain for pair in pairs]
+
+
+def _both(one: Candidate, other: Candidate) -> Candidate:
+    """Two candidates as one, what cannot be negative of either first."""
+    numbers = (
+        one.parameters[: one.positive],
+        other.parameters[: other.positive],
+        one.parameters[one.positive :],
+        other.parameters[other.positive :],
+    )
+    return replace(one, parameters=sum(numbers, ()), positive=one.positive + other.positive)
 
 
 def free_without(

@@ -34,6 +34,7 @@ from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.locate import find_liar
+from rig_identification.mismatch.pairs import first_of_two
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
@@ -112,6 +113,10 @@ def trials(
         problem, evaluation = worst_pieces(problem, evaluation)
     promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
+    if more and not far:
+        one = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
+        if one is not None:
+            return Trials([one])
     look = _Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
     if not far or (promises and promises[0].share > DIRECT):
         look.directly()

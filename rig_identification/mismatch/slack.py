@@ -153,10 +153,11 @@ def quietened(runs: tuple[Run, ...], rests: tuple[RestEvidence, ...]) -> list[Ru
     which that cell would read as nothing.
     """
     quietest: dict[str, float] = {}
-    for evidence in (*runs, *rests):
-        for c in evidence.channels:
-            if c.quantity == "tension":
-                quietest[c.device] = min(float(c.noise[0]), quietest.get(c.device, np.inf))
+    moving = [(c.device, c.quantity, c.noise) for run in runs for c in run.channels]
+    at_rest = [(c.device, c.quantity, c.noise) for rest in rests for c in rest.channels]
+    for device, quantity, noise in (*moving, *at_rest):
+        if quantity == "tension":
+            quietest[device] = min(float(noise[0]), quietest.get(device, np.inf))
     return [
         replace(
             run,

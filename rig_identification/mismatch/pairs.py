@@ -1,0 +1,75 @@
+"""Two small errors at once, where either alone is not what is likeliest.
+
+Near the noise first order can be trusted, and of two effects at once the likelier single hypothesis is
+often a third one: nine numbers of a hose bend to a heavy cable beside a cell's zero, of two numbers. So pairs
+are screened as single ones are. A pair costs what noise gives both of them; where it is worth more than any
+single hypothesis even so, and its fit keeps that, the search begins with the one that says more alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.hypotheses import compatible, needed_gain, slow
+from rig_identification.mismatch.screen import Promise, promises_of, together
+from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished
+
+Notify = Callable[[str], None]
+
+#: Hypotheses that promise most, of which pairs are made.
+PAIRED = 24
+
+
+def first_of_two(
+    problem: Problem,
+    evaluation: Evaluation,
+    promises: list[Promise],
+    count: int,
+    ahead: float,
+    limit: float,
+    notify: Notify,
+    budget: Budget,
+) -> Trial | None:
+    """The one of a pair to begin with; None where no pair is worth more than any single hypothesis.
+
+    promises: of all hypotheses about ``evaluation``, best first; count: of all hypotheses. ahead: nats by
+    which a pair has to be worth more. limit: of ordinary errors, in tolerances.
+    """
+    alone = max((p.gain - needed_gain(p.candidate, count) for p in promises), default=0.0)
+    likely = {p.candidate.label: p for p in promises if not slow(p.candidate) and p.candidate.settle is None}
+    plain = list(likely.values())[:PAIRED]
+    pairs = [
+        (a.candidate, b.candidate)
+        for a, b in combinations(plain, 2)
+        if compatible([b.candidate], [a.candidate])
+    ]
+    worth = [
+        gain - _cost(pair, count)
+        for pair, gain in zip(pairs, together(problem, evaluation, pairs), strict=False)
+    ]
+    if not worth or max(worth) < max(alone, 0.0) + ahead:
+        return None
+    one, other = pairs[worth.index(max(worth))]
+    notify(f"{one.label} and {other.label}")
+    begun = attempt(problem, evaluation, likely[one.label], budget)
+    first = None if begun is None else finished(begun, budget)
+    if first is None:
+        return None
+    (promise,) = promises_of(first.problem, first.evaluation, [other])
+    second = attempt(first.problem, first.evaluation, promise, budget)
+    if second is None:
+        return None
+    ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
+    kept = evaluation.cost - second.evaluation.cost - _cost((one, other), count) > max(alone, 0.0) + ahead
+    meant = all(beyond_doubt(replace(second, candidate=c), ordinary, limit) for c in (one, other))
+    return first if kept and meant else None
+
+
+def _cost(pair: tuple[Candidate, Candidate], count: int) -> float:
+    """Nats that noise gives a pair of ``count`` hypotheses."""
+    return sum(needed_gain(c, count) for c in pair)
