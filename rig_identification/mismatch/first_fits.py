@@ -7,6 +7,7 @@ not take it all away.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -64,6 +65,53 @@ def _coarse(trial: Trial, before: Evaluation) -> bool:
     return chief and trial.candidate.closer is not None and not at_noise(trial)
 
 
+@dataclass
+class _Standing:
+    """What first fits have shown so far, and which promises are worth none any more."""
+
+    far: bool  # much is left, and what reaches the noise is no chance
+    rings: bool  # something rings or swings in the model already
+    budget: Budget
+    out: list[Trial] = field(default_factory=list)
+    kept: float = 0.0  # most that was promised and kept, nats
+    done: bool = False  # one took away all there was
+    reached: float = 0.0  # most that was promised by what leaves only noise
+    nearly: float = 0.0  # ... by what leaves next to nothing
+    enough: bool = False  # nothing that changes the model is looked for any more
+
+    def passes_over(self, promise: Promise) -> bool:
+        """Whether a promise is not worth a fit."""
+        changes = promise.candidate.build is not None
+        if self.rings and changes and promise.share < CHIEF:
+            # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
+            return True
+        if self.budget.spent() and (self.out or changes):
+            return True
+        return self._beaten_far(promise) if self.far else self._beaten_near(promise)
+
+    def _beaten_near(self, promise: Promise) -> bool:
+        """Whether another one promised much more and kept it, or took all and this changes the model."""
+        if promise.gain < min(CLOSE * self.kept, self.kept - BEATEN):
+            return True
+        return self.done and promise.candidate.build is not None and promise.gain < self.kept
+
+    def _beaten_far(self, promise: Promise) -> bool:
+        """Whether another one left nothing, or next to nothing, and much more was expected of it."""
+        if promise.candidate.build is not None and (self.enough or promise.gain < CLOSE * self.reached):
+            return True
+        return promise.gain < CLOSE * self.nearly and slow(promise.candidate)
+
+    def heard(self, promise: Promise, trial: Trial, before: Evaluation, first: bool) -> None:
+        """Take a first fit into account. before: without it; first: of the likeliest promise."""
+        self.out.append(trial)
+        self.kept = max(self.kept, min(promise.gain, before.cost - trial.evaluation.cost))
+        self.done = self.done or excess(trial.evaluation) < BEATEN
+        if self.far and at_noise(trial):
+            self.reached = max(self.reached, promise.gain)
+            # Where so much was left two that leave nothing at all are one too many to be looked for
+            self.enough = not first or (misfit(before) > VERY_FAR and not shows(trial.evaluation))
+
+
 def begun(
     problem: Problem,
     evaluation: Evaluation,
@@ -78,9 +126,7 @@ def begun(
     instead: whether something else explains it all, so that nothing more is begun; asked where nothing that
     is fitted soon or promises the larger part leaves only noise, before what is slow and promises less.
     """
-    out: list[Trial] = []
-    reached, nearly, kept, done, enough = 0.0, 0.0, 0.0, False, False
-    rings, very_far = gives_way(problem.bench.parameters.model), misfit(evaluation) > VERY_FAR
+    standing = _Standing(far, gives_way(problem.bench.parameters.model), budget)
     if not far:
         # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
         most = max((p.gain for p in worthy), default=0.0)
@@ -89,45 +135,24 @@ def begun(
             key=lambda p: (p.candidate.build is not None or p.gain < CLOSE * most, -p.gain),
         )
     for promise in worthy:
-        if promise.candidate.build is not None and promise.share < CHIEF and rings:
-            # On top of what rings or swings already a fit takes minutes: for the larger part of what is left
-            continue
-        if budget.spent() and (out or promise.candidate.build is not None):
-            continue
-        if not far and promise.gain < min(CLOSE * kept, kept - BEATEN):
-            # Another hypothesis promised much more, near the noise, and kept it
-            continue
-        if not far and done and promise.candidate.build is not None and promise.gain < kept:
-            # Another one took away all there was: what changes the model, and promised less, is no likelier
-            continue
-        if far and promise.candidate.build is not None and (enough or promise.gain < CLOSE * reached):
-            # Another one left nothing already, and much more was expected of it, or that is no chance
-            continue
-        if far and promise.gain < CLOSE * nearly and slow(promise.candidate):
-            # Another one left next to nothing, and much more was expected of it
+        if standing.passes_over(promise):
             continue
         chief = promise.candidate.build is None or promise.share > CHIEF
-        if instead is not None and not chief and not any(at_noise(t) for t in out):
+        if instead is not None and not chief and not any(at_noise(t) for t in standing.out):
             explained, instead = instead(), None
             if explained:
-                return out
+                return standing.out
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise, budget)
         if trial is not None and far and (_almost(trial, evaluation) or _coarse(trial, evaluation)):
             # Worth its last steps before any other is tried
             trial = finished(trial, budget) or trial
-            nearly = max(nearly, promise.gain)
+            standing.nearly = max(standing.nearly, promise.gain)
         if trial is not None:
-            out.append(trial)
-            kept = max(kept, min(promise.gain, evaluation.cost - trial.evaluation.cost))
-            done = done or excess(trial.evaluation) < BEATEN
-            if far and at_noise(trial):
-                reached = max(reached, promise.gain)
-                # Where so much was left two that leave nothing at all are one too many to be looked for
-                enough = promise is not worthy[0] or (very_far and not shows(trial.evaluation))
-    if instead is not None and not any(at_noise(t) for t in out) and not budget.spent():
+            standing.heard(promise, trial, evaluation, promise is worthy[0])
+    if instead is not None and not any(at_noise(t) for t in standing.out) and not budget.spent():
         instead()
-    return out
+    return standing.out
 
 
 def leading(

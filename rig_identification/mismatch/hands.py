@@ -8,6 +8,7 @@ from scipy.signal import savgol_filter
 
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.mismatch.findings import written
 from rig_identification.recording import Recording
 from rig_identification.result import Finding
 
@@ -68,7 +69,7 @@ def hand_finding(fitted: Fitted) -> Finding | None:
     return Finding(
         "external_force",
         {"channel": None, "axis": None, "times": times},
-        {"peak_force": {"value": peak, "std": level, "unit": "N"}},
+        written({"peak_force": (peak, level, "N")}),
         {"log_likelihood_gain": None, "holdout_error_before": None, "holdout_error_after": None},
         f"A person's hand or another outside force drives the body ({told}), with up to {peak:.2g} N. "
         "These parts were left out; let go before the recording that counts.",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from rig_identification.mismatch.findings import written
 from rig_identification.recording import Overrange, Recording, Session
 from rig_identification.result import Finding, Mismatch
 
@@ -55,8 +56,8 @@ def _finding(ends: list[tuple[Recording, Overrange]]) -> Finding:
         f"{first.device} stops at the end of its range: {count} samples of {what} lie exactly at {stops} "
         f"{first.unit} and are left out of the fit. Set a larger range or shake more gently."
     )
-    told = {"limit": {"value": abs(limit) if both else limit, "std": 0.0, "unit": first.unit}}
-    return Finding("unknown", where, told, _NOTHING, text)
+    told = {"limit": (abs(limit) if both else limit, 0.0, first.unit)}
+    return Finding("unknown", where, written(told), _NOTHING, text)
 
 
 def with_overranges(mismatch: Mismatch, session: Session) -> Mismatch:

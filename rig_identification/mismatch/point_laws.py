@@ -24,6 +24,7 @@ from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate, Told, added
+from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.places import travel_of
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
@@ -336,10 +337,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     share = float(told[first]["std"]) / abs(float(told[first]["value"]))
     rms, peak = float(np.sqrt(np.mean(sizes**2))), float(np.max(sizes))
     told = {first: told.pop(first)} | told
-    told |= {
-        "force": {"value": rms, "std": share * rms, "unit": "N"},
-        "peak_force": {"value": peak, "std": share * peak, "unit": "N"},
-    }
+    told |= written({"force": (rms, share * rms, "N"), "peak_force": (peak, share * peak, "N")})
     grows = " and ".join(
         f"{WORDS[name]} ({told[name]['value']:.4g} ± {told[name]['std']:.2g} {told[name]['unit']})"
         for name in parts

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.latent import MissingWrench, joined, missing_wrench, strongest_push
 from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.locate import Event
@@ -56,17 +57,15 @@ def push_finding(
         "position": [float(v) for v in push.point],
         "times": times,
     }
-    told = {"peak_force": {"value": value, "std": std, "unit": "N"}}
-    told |= {
-        f"peak_force_{a}": {"value": float(push.peak[i]), "std": std, "unit": "N"} for i, a in enumerate(AXES)
-    }
+    peaks = {"peak_force": (value, std, "N")}
+    peaks |= {f"peak_force_{a}": (float(push.peak[i]), std, "N") for i, a in enumerate(AXES)}
     text = (
         f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with "
         f"up to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These "
         "seconds are left out of the fit. Keep people and draughts away from the rig, or cut the recording "
         "there."
     )
-    return Finding("external_force", where, told, {}, text), push.start, push.end
+    return Finding("external_force", where, written(peaks), {}, text), push.start, push.end
 
 
 def unknown_finding(
@@ -104,13 +103,11 @@ def unknown_finding(
             f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
         )
         text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."
+    std = float(push.std) if np.isfinite(push.std) else float(np.max(strength))
+    turning = float(np.std(about[:, int(np.argmax(moment))]) / np.sqrt(max(1, about.shape[0])))
     told = {
-        "force": {"value": float(np.max(strength)), "std": float(push.std), "unit": "N"},
-        "moment": {"value": float(np.max(moment)), "std": float("nan"), "unit": "N*m"},
-        "peak_force": {"value": push.size, "std": float(push.std), "unit": "N"},
+        "force": (float(np.max(strength)), std, "N"),
+        "moment": (float(np.max(moment)), turning, "N*m"),
+        "peak_force": (push.size, std, "N"),
     }
-    told["moment"]["std"] = float(np.std(about[:, int(np.argmax(moment))]) / np.sqrt(max(1, about.shape[0])))
-    if not np.isfinite(push.std):
-        for part in ("force", "peak_force"):
-            told[part]["std"] = float(np.max(strength))
-    return Finding("unknown", where, told, {}, text)
+    return Finding("unknown", where, written(told), {}, text)
