@@ -54,7 +54,7 @@ def shows(evaluation: Evaluation) -> bool:
     return bool(excess(evaluation) >= SEEN * np.sqrt(0.5 * size))
 
 
-def _almost(trial: Trial, before: Evaluation) -> bool:
+def almost(trial: Trial, before: Evaluation) -> bool:
     """Whether a hypothesis leaves next to nothing of what was left ``before``, and yet more than noise."""
     return not at_noise(trial) and excess(trial.evaluation) < ALMOST * excess(before)
 
@@ -144,7 +144,7 @@ def begun(
                 return standing.out
         notify(promise.candidate.label)
         trial = attempt(problem, evaluation, promise, budget)
-        if trial is not None and far and (_almost(trial, evaluation) or _coarse(trial, evaluation)):
+        if trial is not None and far and (almost(trial, evaluation) or _coarse(trial, evaluation)):
             # Worth its last steps before any other is tried
             trial = finished(trial, budget) or trial
             standing.nearly = max(standing.nearly, promise.gain)

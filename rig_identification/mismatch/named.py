@@ -51,6 +51,7 @@ def named(
             search.budget,
             more=step + 1 < MOST_EFFECTS,
             law=None if step else law,
+            guess=None if step or ideal.fitted.guess is None else ideal.fitted.guess.theta,
         )
         if tried.lawful is not None:
             return tried.lawful

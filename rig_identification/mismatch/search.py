@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
@@ -25,6 +26,7 @@ from rig_identification.mismatch.first_fits import (
     RIVAL,
     VERY_FAR,
     Notify,
+    almost,
     at_noise,
     begun,
     leading,
@@ -45,6 +47,7 @@ from rig_identification.mismatch.trial import (
     log_evidence,
     mass_of,
 )
+from rig_identification.mismatch.unbent import at_first, best_of, likely, unbent
 
 #: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
 #: than so much and whole runs do not refute it.
@@ -97,6 +100,7 @@ def trials(
     budget: Budget = UNLIMITED,
     more: bool = False,
     law: Law | None = None,
+    guess: NDArray[np.float64] | None = None,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
@@ -105,7 +109,8 @@ def trials(
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
     tried whatever screening says. screened: promises about this evaluation, where they are known. Where the
     budget is spent nothing more that changes the model is begun. more: another effect may be added after.
-    law: what may explain all where nothing that first order tells of does.
+    law: what may explain all where nothing that first order tells of does. guess: the problem's parameters
+    where the ideal model's fit began, as long as nothing else is in the model.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
@@ -118,12 +123,14 @@ def trials(
         if one is not None:
             return Trials([one])
     look = _Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
-    if not far or (promises and promises[0].share > DIRECT):
+    if misfit(seen) > VERY_FAR:
+        look.from_nothing_bent(guess)
+    lead = look.leading() if more else None
+    if lead is None and not look.at_noise and (not far or (promises and promises[0].share > DIRECT)):
         look.directly()
-    if far and more and not look.at_noise:
-        lead = leading(look.tried, seen, candidates, mass, notify, look.budget)
-        if lead is not None:
-            return Trials([lead])
+        lead = look.leading() if more else None
+    if lead is not None:
+        return Trials([lead])
     if far and not look.at_noise:
         look.without_devices()
     if far and not look.at_noise:
@@ -191,6 +198,31 @@ class _Look:
         if not self.far and shows(self.seen):
             worthy = [p for p in worthy if p.share > WORTH]
         self.begin(worthy)
+
+    def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
+        """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
+        self.notify("from where nothing is bent")
+        about = unbent(self.here, self.seen)
+        first = None if guess is None else at_first(self.here, self.seen, guess)
+        starts = [e for e in (about, first) if e is not None]
+        again = [] if about is None else screen(self.here, about, self.candidates, self.mass)
+        for promise in likely(self.promises, again):
+            if self.budget.spent() or self.at_noise:
+                break
+            self.notify(promise.candidate.label)
+            trial = best_of(self.here, starts, promise, self.budget)
+            if trial is None:
+                continue
+            self.tried.append(trial)
+            if almost(trial, self.seen):
+                # What is left of it is for one more to take
+                break
+
+    def leading(self) -> Trial | None:
+        """Far from the noise: what leaves nothing together with one more; see :func:`first_fits.leading`."""
+        if not self.far or self.at_noise or not self.tried:
+            return None
+        return leading(self.tried, self.seen, self.candidates, self.mass, self.notify, self.budget)
 
     def without_devices(self) -> None:
         """What is wrong with the device that contradicts all others, if one does."""

@@ -1,0 +1,58 @@
+"""From where nothing is bent: rig and devices as described, whatever the ideal model made of them.
+
+A model that lacks much bends everything to swallow it. About such a fit first order may promise nothing of
+what is wrong, for a level that is off by many tolerances is spread over a dozen hinges by then; and descent
+from there, with the right effect in the model, may end in another valley. So where very much is left
+hypotheses are screened about the same body in the rig as described as well, and fitted from there and from
+where the ideal model's own fit began.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import zip_longest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.growing import settled_starts
+from rig_identification.estimate.launch import launch_states
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.hypotheses import slow
+from rig_identification.mismatch.screen import Promise
+from rig_identification.mismatch.trial import Trial, attempt
+
+#: Promises that are tried, of each screening.
+MOST = 4
+
+
+def unbent(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
+    """About the same body, and all that an effect added, in a rig as it is described."""
+    theta = evaluation.point.theta.copy()
+    for i, q in enumerate(problem.bench.parameters.free, start=INERTIAL):
+        if q.bounded:
+            theta[i] = 0.0
+    point = replace(evaluation.point, theta=theta)
+    return evaluate(problem, replace(point, starts=settled_starts(problem, point)))
+
+
+def at_first(problem: Problem, evaluation: Evaluation, theta: NDArray[np.float64]) -> Evaluation | None:
+    """About ``theta``, where the ideal model's fit began."""
+    guesses = evaluation.point.rest_guesses
+    rest = (*guesses, *evaluation.point.starts)[0]
+    starts = launch_states(problem.bench, problem.runs, theta, rest)
+    return evaluate(problem, Point(theta, starts, guesses))
+
+
+def likely(*screened: list[Promise]) -> list[Promise]:
+    """Of promises, best first, those that are tried, in turn: fits that take a second or two."""
+    soon = [[p for p in promises if not slow(p.candidate)][:MOST] for promises in screened]
+    return [p for turn in zip_longest(*soon) for p in turn if p is not None]
+
+
+def best_of(problem: Problem, starts: list[Evaluation], promise: Promise, budget: Budget) -> Trial | None:
+    """The likelier first fit of a promise from either start."""
+    tried = [attempt(problem, start, promise, budget) for start in starts]
+    return max((t for t in tried if t is not None), key=lambda t: t.evidence, default=None)
