@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.whole import fit_whole
@@ -110,7 +111,14 @@ def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
 
 
 def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Explained | None:
-    """What was found outside a push, and the push as the model found there sees it; None where it is none."""
+    """What was found outside a push, and the push as the model found there sees it; None where it is none.
+
+    Where every residual is noise in the push's seconds as well there is none, and what was found stands alone:
+    a short piece lost its way without it.
+    """
+    whole = _undisturbed(found, ideal)
+    if whole is not None:
+        return replace(found, fitted=whole)
     fitted = found.fitted
     evaluation = fitted.evaluation
     pieces = replace(here, bench=fitted.problem.bench)
@@ -125,6 +133,14 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
         findings=(*found.mismatch.findings, push),
     )
     return replace(found, mismatch=mismatch)
+
+
+def _undisturbed(found: Explained, ideal: Ideal) -> Fitted | None:
+    """All of every run with the model found outside a push; None where that leaves something."""
+    outside_of_it = found.fitted
+    whole = replace(outside_of_it.problem, runs=ideal.fitted.problem.runs)
+    fitted = fit_whole(ideal.fitted, whole, outside_of_it.problem, outside_of_it.evaluation.point)
+    return fitted if judged(fitted)[1].verdict == "none" else None
 
 
 def _all_without(runs: tuple[Run, ...], event: Event, start: float, end: float) -> tuple[Run, ...]:
