@@ -113,8 +113,8 @@ def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
 def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Explained | None:
     """What was found outside a push, and the push as the model found there sees it; None where it is none.
 
-    Where every residual is noise in the push's seconds as well there is none, and what was found stands alone:
-    a short piece lost its way without it.
+    Where every residual is noise in the push's seconds as well there is none, and what was found stands
+    alone: a short piece lost its way without it.
     """
     whole = _undisturbed(found, ideal)
     if whole is not None:
