@@ -15,6 +15,18 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
+def _new_wrench(P, Q):  # type: ignore[no-untyped-def]
+    """Write a new interval's wrench, of covariance ``Q`` (6, 6), into ``P``: nothing is known of it yet."""
+    states = P.shape[0] - 6
+    for i in range(6):
+        for j in range(6):
+            P[states + i, states + j] = Q[i, j]
+        for j in range(states):
+            P[states + i, j] = 0.0
+            P[j, states + i] = 0.0
+
+
+@njit(cache=True, nogil=True)
 def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-untyped-def]
     """Replace ``columns`` (m, c) by their normalised innovations; returns the sum of log standard deviations.
 
@@ -38,12 +50,8 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
     P_next = np.empty((states, states))
     F = np.empty((states, size))
     for k in range(A.shape[0]):
+        _new_wrench(P, Q[k])
         for i in range(6):
-            for j in range(6):
-                P[states + i, states + j] = Q[k, i, j]
-            for j in range(states):
-                P[states + i, j] = 0.0
-                P[j, states + i] = 0.0
             for c in range(count):
                 X[states + i, c] = 0.0
             X[states + i, 0] = -latent[k, i]
@@ -104,12 +112,7 @@ def filter_of(A, B, Q, node, H, D, variance):  # type: ignore[no-untyped-def]
     h, gain, F = np.empty(size), np.empty(size), np.empty((states, size))
     row = 0
     for k in range(A.shape[0]):
-        for i in range(6):
-            for j in range(6):
-                P[states + i, states + j] = Q[k, i, j]
-            for j in range(states):
-                P[states + i, j] = 0.0
-                P[j, states + i] = 0.0
+        _new_wrench(P, Q[k])
         while row < node.shape[0] and node[row] == k:
             h[:states] = H[row]
             h[states:] = D[row]
@@ -154,13 +157,9 @@ def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ign
     F = np.empty((order, size))
     row = 0
     for k in range(nodes):
+        _new_wrench(P, Q[k])
         for i in range(6):
             x[order + i] = -latent[k, i]
-            for j in range(6):
-                P[order + i, order + j] = Q[k, i, j]
-            for j in range(order):
-                P[order + i, j] = 0.0
-                P[j, order + i] = 0.0
         means[k] = x
         spreads[k] = P
         while row < rows and node[row] == k:
