@@ -17,8 +17,10 @@ from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.whitening import whiten
 from rig_identification.mismatch.latent import MissingWrench, joined, strongest_push
 from rig_identification.mismatch.law import law_of
+from rig_identification.mismatch.places import crossed, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
-from rig_identification.mismatch.riders import DAMPING, FREQUENCIES, travels
+from rig_identification.mismatch.rider_places import travel_along
+from rig_identification.mismatch.riders import DAMPING, FREQUENCIES
 from rig_identification.mismatch.supports import (
     cable_elasticity,
     ceiling_candidate,
@@ -91,18 +93,26 @@ def test_pieces_are_joined_in_order() -> None:
 def test_a_massless_rider_travels_as_its_equation_says() -> None:
     step, omega = 0.005, 2.0 * np.pi * 0.8
     t = step * np.arange(24000)
-    force = np.zeros((t.size, 3))
+    force = np.zeros((t.size, 4))
     force[:, 0] = np.sin(omega * t)
-    found = travels(force, np.zeros((t.size, 3)), step)
     for frequency in FREQUENCIES[6:20:5]:
         own = 2.0 * np.pi * frequency
         answer = -1.0 / (own**2 - omega**2 + 2j * DAMPING * own * omega)
-        q, acceleration = found["x", frequency]
+        q, push = travel_along(force, 0.0, frequency, DAMPING, step)
         late = t > 100.0
         expected = np.imag(answer * np.exp(1j * omega * t))
-        assert np.max(np.abs(q - expected)[late]) < 1e-3 * abs(answer)
-        assert np.max(np.abs(acceleration + omega**2 * expected)[late]) < 2e-2 * omega**2 * abs(answer)
-        assert np.max(np.abs(found["y", frequency][0])) == 0.0
+        assert np.max(np.abs(q[:, 0] - expected)[late]) < 1e-3 * abs(answer)
+        assert np.max(np.abs(push[:, 0] - omega**2 * expected)[late]) < 2e-2 * omega**2 * abs(answer)
+        assert np.max(np.abs(q[:, 1:])) == 0.0
+
+
+def test_products_of_what_is_linear_in_a_place_are_those_at_every_place() -> None:
+    rng = np.random.default_rng(4)
+    a, b, u = rng.normal(size=(5, 3, 4)), rng.normal(size=(5, 3, 4)), rng.normal(size=3)
+    there = np.array([1.0, *u])
+    assert np.allclose(multiplied(a[:, 0], b[:, 1]) @ monomials(u), (a[:, 0] @ there) * (b[:, 1] @ there))
+    assert np.allclose(multiplied(a[:, 0], b[0, 1]) @ monomials(u), (a[:, 0] @ there) * (b[0, 1] @ there))
+    assert np.allclose(crossed(a, b) @ monomials(u), np.cross(a @ there, b @ there))
 
 
 def test_supports_change_the_model_and_nothing_else() -> None:

@@ -40,6 +40,7 @@ SEEN = 4.0
 #: Near the noise: log evidence by which a hypothesis is beaten for good, and the share of what another one
 #: promised and kept that its promise must come to.
 BEATEN = 30.0
+NO_TIE = 10.0
 CLOSE = 0.7
 
 
@@ -93,7 +94,7 @@ class _Standing:
         """Whether another one promised much more and kept it, or took all and this changes the model."""
         if promise.gain < min(CLOSE * self.kept, self.kept - BEATEN):
             return True
-        return self.done and promise.candidate.build is not None and promise.gain < self.kept
+        return self.done and promise.candidate.build is not None and promise.gain < self.kept - NO_TIE
 
     def _beaten_far(self, promise: Promise) -> bool:
         """Whether another one left nothing, or next to nothing, and much more was expected of it."""

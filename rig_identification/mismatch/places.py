@@ -33,16 +33,26 @@ def monomials(u: Array) -> Array:
     return np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, x * z, y * z], axis=-1)
 
 
+def multiplied(a: Array, b: Array) -> Array:
+    """(N, TERMS) product of numbers (N, 4) or (4,) that are linear in a place: constant, then slopes."""
+    out = np.empty((max(a.shape, b.shape, key=len)[0], TERMS))
+    a, b = a.T, b.T
+    out[:, 0] = a[0] * b[0]
+    for i in range(1, 4):
+        out[:, i] = a[0] * b[i] + a[i] * b[0]
+        out[:, 3 + i] = a[i] * b[i]
+    for term, (i, j) in enumerate(combinations(range(1, 4), 2), start=7):
+        out[:, term] = a[i] * b[j] + a[j] * b[i]
+    return out
+
+
 def crossed(a: Array, b: Array) -> Array:
     """(N, 3, TERMS) cross product of vectors (N, 3, 4) that are linear in a place: constant, then slopes."""
 
-    def cross(i: int, j: int) -> Array:
-        return np.asarray(np.cross(a[..., i], b[..., j]))
+    def component(i: int, j: int) -> Array:
+        return multiplied(a[:, i], b[:, j]) - multiplied(a[:, j], b[:, i])
 
-    own = [cross(i, i) for i in range(1, 4)]
-    slopes = [cross(0, i) + cross(i, 0) for i in range(1, 4)]
-    pairs = [cross(i, j) + cross(j, i) for i, j in combinations(range(1, 4), 2)]
-    return np.stack([cross(0, 0), *slopes, *own, *pairs], axis=-1)
+    return np.stack([component(1, 2), component(2, 0), component(0, 1)], axis=1)
 
 
 def lines(nodes: int, middle: Array, spread: float) -> Array:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import cont2discrete
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, Parameter
-from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -48,8 +48,6 @@ class Swing:
 
 
 SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES)
-#: Columns of a swing: the mass, and the mass times each coordinate of its place.
-WIDTH = 4
 
 
 def middle_of(rig: Rig) -> Array:
@@ -67,70 +65,12 @@ def filters(frequency: float, step: float, damping: float = DAMPING) -> tuple[Ar
     return np.atleast_2d(numerator)[0], np.asarray(denominator)
 
 
-def travels(force: Array, gravity: Array, step: float) -> dict[tuple[str, float], tuple[Array, Array]]:
-    """Travel and acceleration (N,) of a massless rider, by axis and frequency.
-
-    force (N, 3): specific force at the rider plus gravity in the rest pose, body axes. gravity (N, 3):
-    gravity less that of the rest pose, body axes: before the first node the rider hangs in it.
-    """
-    out = {}
-    for i, axis in enumerate(AXES):
-        for frequency in FREQUENCIES:
-            omega = 2.0 * np.pi * frequency
-            numerator, denominator = filters(frequency, step)
-            # Displaced by its weight before the start: the deviation from there starts from zero
-            before = gravity[0, i] / omega**2
-            away = np.asarray(lfilter(numerator, denominator, force[:, i] + gravity[0, i]))
-            q = away + before
-            rate = np.gradient(q, step)
-            out[axis, frequency] = (q, -force[:, i] - 2.0 * DAMPING * omega * rate - omega**2 * q)
-    return out
-
-
 def pieces_of(problem: Problem) -> dict[str, list[int]]:
     """Runs of a problem by recording, in order of time."""
     groups: dict[str, list[int]] = {}
     for i, run in enumerate(problem.runs):
         groups.setdefault(run.recording.name, []).append(i)
     return {name: sorted(which, key=lambda i: problem.runs[i].offset) for name, which in groups.items()}
-
-
-def rider_wrenches(problem: Problem, evaluation: Evaluation) -> dict[int, Array]:
-    """(N, 6, WIDTH len(SWINGS)) wrench per kilogram of every swing, for each run of the problem."""
-    rig, model = problem.bench.rig, problem.bench.parameters.model
-    block = layout.effects_offset(model.cables)
-    first = block + place.REFERENCE_ROTATION
-    R_rest = model.physics[first : first + 9].reshape(3, 3)
-    middle = middle_of(rig)
-    out: dict[int, Array] = {}
-    for which in pieces_of(problem).values():
-        raw = np.concatenate(
-            [evaluation.runs[i].motion.outputs[: None if i == which[-1] else -1] for i in which]
-        )
-        step = problem.runs[which[0]].grid.step
-        f = raw[:, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3]
-        w = raw[:, layout.OUT_RATE : layout.OUT_RATE + 3]
-        alpha = raw[:, layout.OUT_ANGULAR_ACCELERATION : layout.OUT_ANGULAR_ACCELERATION + 3]
-        g = raw[:, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3]
-        g_rest = R_rest.T @ model.physics[:3]
-        at = f + np.cross(alpha, middle) + np.cross(w, np.cross(w, middle))
-        single = travels(at + g_rest, g - g_rest, step)
-        wrench = np.zeros((raw.shape[0], 6, WIDTH * len(SWINGS)))
-        for k, swing in enumerate(SWINGS):
-            for axis in DIRECTIONS[swing.directions]:
-                d = np.eye(3)[AXES.index(axis)]
-                q, acceleration = single[axis, swing.frequency]
-                push = -acceleration[:, None] * d
-                wrench[:, :3, WIDTH * k] += push
-                wrench[:, 3:, WIDTH * k] -= np.cross(q[:, None] * d, f)
-                for j in range(3):
-                    wrench[:, 3:, WIDTH * k + 1 + j] += np.cross(np.eye(3)[j], push)
-        start = 0
-        for i in which:
-            nodes = problem.runs[i].grid.nodes
-            out[i] = wrench[start : start + nodes]
-            start += nodes - 1
-    return out
 
 
 def rider_candidate(

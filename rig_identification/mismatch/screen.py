@@ -15,22 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
-from rig_identification.mismatch.response import whitened_response
-from rig_identification.mismatch.rider_places import finer, spread_of
+from rig_identification.mismatch.rider_places import Ridden, finer, scanned, spread_of
 from rig_identification.mismatch.riders import (
-    SWINGS,
-    WIDTH,
     Swing,
     middle_of,
     rider_candidate,
-    rider_wrenches,
 )
 from rig_identification.mismatch.supports import (
     cable_elasticity,
@@ -243,37 +238,17 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
 
 
 def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
-    """The best swing of each direction."""
-    full = beyond.full
-    wrenches = rider_wrenches(problem, full)
-    responses = [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(full.runs)]
-    found = beyond.of(responses)
-    center = middle_of(problem.bench.rig)
-    far = 0.5 * float(np.max(extent(problem.bench.rig)))
-    # Columns of a mass at the middle, and of its distance from there
-    about = np.eye(WIDTH)
-    about[1:, 0] = center
+    """The best swing of each direction, of effects that are not in the model already."""
+    taken = {p.name for p in problem.bench.parameters.free}
     best: dict[tuple[str, str], Promise] = {}
-    near = misfit(full) < NEAR_SQUARE
-    for k, swing in enumerate(SWINGS):
-        chosen = slice(WIDTH * k, WIDTH * (k + 1))
-        columns, own = found.part(chosen), [r[:, chosen] for r in responses]
-        matrix = about.T @ columns.information(own) @ about
-        right = about.T @ columns.right
-        alone = right[0] / (matrix[0, 0] + 1.0 / (0.05 * mass) ** 2)
-        if alone <= 0.0:
-            continue
-        prior = np.diag([1.0 / (0.05 * mass) ** 2] + [1.0 / (alone * far) ** 2] * 3)
-        step = np.linalg.lstsq(matrix + prior, right, rcond=1e-12)[0]
-        gain = 0.5 * float(step @ right)
-        kind = swing.effect, swing.directions
-        if step[0] > 0.0 and near and (kind not in best or gain > best[kind].gain):
-            gain -= _unearned(problem, beyond, columns, about @ step, own)
-        if step[0] <= 0.0 or (kind in best and gain <= best[kind].gain):
-            continue
-        at = center + np.clip(step[1:] / step[0], -2.0 * far, 2.0 * far)
-        candidate, values = rider_candidate(problem, swing, mass, float(step[0]), at)
-        best[kind] = Promise(candidate, gain, values)
+    for ridden in scanned(problem, beyond, mass):
+        effect = ridden.swing.effect
+        kind = effect, ridden.swing.directions
+        # A second one of an effect would write its numbers over the first one's
+        if f"{effect}.mass" not in taken and (kind not in best or ridden.best.gain > best[kind].gain):
+            promise = _ridden_promise(problem, beyond, ridden, mass)
+            if kind not in best or promise.gain > best[kind].gain:
+                best[kind] = promise
     for kind in sorted(best, key=lambda kind: -best[kind].gain)[:FINER]:
         best[kind] = max(best[kind], *_finer(problem, beyond, best[kind], mass), key=lambda p: p.gain)
     return list(best.values())
@@ -287,12 +262,17 @@ def _finer(problem: Problem, beyond: Beyond, coarse: Promise, mass: float) -> li
     found = finer(problem, beyond, Swing("xy" if axis is None else str(axis), frequency), mass)
     if found is None:
         return []
+    return [_ridden_promise(problem, beyond, found, mass)]
+
+
+def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float) -> Promise:
+    """What a scanned rider promises; near the noise, what of it a motion accounts for."""
     best, gain = found.best, found.best.gain
     if misfit(beyond.full) < NEAR_SQUARE:
         gain -= _unearned(problem, beyond, found.columns, best.weights, found.runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
-    return [Promise(candidate, gain, values | {f"{effect}.damping_ratio": found.damping})]
+    return Promise(candidate, gain, values | {f"{found.swing.effect}.damping_ratio": found.damping})
 
 
 def _unearned(problem: Problem, beyond: Beyond, columns: Columns, amounts: Array, runs: list[Array]) -> float:
