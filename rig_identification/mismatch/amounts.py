@@ -19,6 +19,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.riders import Swing, rider_candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.supports import (
+    CEILING_FREQUENCY,
     cable_elasticity,
     ceiling_candidate,
     gives_way,
@@ -36,6 +37,9 @@ WORTH = 0.05
 SINKS = (0.03, 0.7)
 #: Multiples of the usual stiffness of cables that are tried: thin wire to thick rope.
 STRETCHES = (0.1, 18.0)
+#: Frequencies (Hz) of a ceiling by itself that are tried: what it weighs decides at which one it rings with
+#: the body, and a light one that is held for a heavy one is out of step at any compliance.
+CEILING_FREQUENCIES = (CEILING_FREQUENCY, 2.0 * CEILING_FREQUENCY, 4.0 * CEILING_FREQUENCY)
 #: What takes energy out, and the parts of its prior's std that are tried.
 BRAKES = ("hinge_damping", "hinge_friction", "air_drag")
 BRAKED = (0.1, 10.0)
@@ -116,19 +120,21 @@ def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Prom
     rig, model = problem.bench.rig, problem.bench.parameters.model
     if gives_way(model):
         return []
-    elasticity = cable_elasticity(rig, model, mass)
-    tried = [Amount(problem, evaluation, elasticity, "cable.axial_stiffness")]
-    for axis, a in enumerate(AXES):
-        ceiling = ceiling_candidate(rig, model, mass, axis)
-        tried.append(Amount(problem, evaluation, ceiling, f"ceiling.compliance.{a}"))
     # Near the noise little of it is seen: an amount that is not nearly right explains none of that
     spaced = SPACED if misfit(evaluation) > NEAR_SQUARE else FINELY
     stretches = usual_stiffness(rig, mass) * _spread(STRETCHES, spaced)
-    sinks = largest_compliance(rig, mass) * _spread(SINKS, spaced)
-    out = [amount.best(list(sinks if k else stretches)) for k, amount in enumerate(tried)]
+    elasticity = cable_elasticity(rig, model, mass)
+    of_cables = Amount(problem, evaluation, elasticity, "cable.axial_stiffness")
+    found = [(of_cables, of_cables.best(list(stretches)))]
+    sinks = list(largest_compliance(rig, mass) * _spread(SINKS, spaced))
+    for axis, a in enumerate(AXES):
+        ceilings = [ceiling_candidate(rig, model, mass, axis, frequency=f) for f in CEILING_FREQUENCIES]
+        tried = [Amount(problem, evaluation, c, f"ceiling.compliance.{a}") for c in ceilings]
+        found.append(max(((t, t.best(sinks)) for t in tried), key=lambda t: t[1].gain))
+    out = [promise for _, promise in found]
     first = int(np.argmax([promise.gain for promise in out]))
     if out[first].gain > 0.0:
-        out[first] = tried[first].refined(out[first], spaced)
+        out[first] = found[first][0].refined(out[first], spaced)
     return out
 
 

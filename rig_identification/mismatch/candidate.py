@@ -35,6 +35,7 @@ class Candidate:
     #: where their fits start
     closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
     curved: bool = False  # its amounts bend the valleys of a fit: a force by a power of the motion
+    everywhere: bool = False  # every rig has some of it: only how much is a question
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property

@@ -14,8 +14,8 @@ from rig_identification.result import Mismatch
 #: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
 #: model of a swinging liquid or a dry hinge is perfect.
 TRACE, TRACE_SQUARE = 0.01, 1.03
-#: Where the ideal model left a hundred times as much again, of which no model follows the last ten-thousandth,
-#: what is left may come to a held-out error of 1.1, which the contract calls explained.
+#: Where the ideal model left a hundred times as much again, of which no model follows the last part in ten
+#: thousand, what is left may come to a held-out error of 1.1, which the contract calls explained.
 NEXT_TO_NONE, NEXT_TO_NONE_SQUARE = 1e-4, 1.1**2
 
 

@@ -92,6 +92,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             {"channel": None, "axis": None},
             positive=1,
             name_in_result="added_mass",
+            everywhere=True,
         ),
         Candidate(
             "cable_mass",
@@ -101,6 +102,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             {"channel": None, "axis": None},
             positive=1,
             name_in_result="linear_density",
+            everywhere=True,
         ),
         *tethers(rig, mass),
     ]

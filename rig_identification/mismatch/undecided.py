@@ -6,7 +6,9 @@ makes of the recordings is another one than with it. So it is fitted, stated as 
 nothing, and the body's interval covers both (estimate/mixture.py).
 
 How far it trails: half the log of how much sharper the recordings know its amount than the prior does, and
-the log of the number of hypotheses that are as likely as it is beforehand, less what it gains.
+the log of the number of hypotheses that are as likely as it is beforehand, less what it gains. What every
+rig has some of, as all cables weigh and all bodies take air along, is no chance among many: of that only the
+amount is asked.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.screen import Promise
@@ -45,16 +48,23 @@ def undecided(
 
     promises: about ``evaluation``, of ``count`` hypotheses.
     """
-    chance, nothing = float(np.log(count)), log_evidence(evaluation)
-    close = [p for p in promises if p.charge is not None and p.charge + chance - p.gain < TIED]
+    nothing = log_evidence(evaluation)
+
+    def chance(candidate: Candidate) -> float:
+        return 0.0 if candidate.everywhere else float(np.log(count))
+
+    def trails(promise: Promise) -> float:
+        return (promise.charge or 0.0) + chance(promise.candidate) - promise.gain
+
+    close = [p for p in promises if p.charge is not None and trails(p) < TIED]
     stated: list[tuple[float, Trial]] = []
-    for promise in sorted(close, key=lambda p: (p.charge or 0.0) - p.gain)[:STATED]:
+    for promise in sorted(close, key=trails)[:STATED]:
         notify(f"search: {promise.candidate.label}, which may be there", 0.5)
         begun = attempt(problem, evaluation, promise, budget)
         ended = None if begun is None else finished(begun, budget)
         if ended is None or not ended.settled:
             continue
-        gap = nothing + chance - ended.evidence
+        gap = nothing + chance(promise.candidate) - ended.evidence
         if gap < TIED:
             stated.append((max(gap, 0.0), ended))
     if not stated:
