@@ -82,6 +82,7 @@ class Rig:
     cables: tuple[Cable, ...]  # two or more
     mass: float | None = None  # kg, body and frame together, from the ground scale
     mass_std: float | None = None  # kg
+    cable_linear_density: float | None = None  # kg/m, as weighed; None: not known, and taken for none
     frame: CarryingFrame | None = None
     imu: Mount | None = None
     inclinometer: Mount | None = None  # its position does not matter and is zero
@@ -89,3 +90,15 @@ class Rig:
     mocap: Mount | None = None  # pose of the marker frame in body; None: not known
     noise: dict[str, float] = field(default_factory=dict)  # keys of NOISE_NAMES; missing: estimate it
     tolerance: dict[str, float] = field(default_factory=lambda: dict(DEFAULT_TOLERANCE))  # complete
+
+    def cable_weight_at_cells(self, steepness: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(..., n) N: what the cables' known weight adds at their load cells, at rest.
+
+        steepness (..., n): upward component of each cable's direction. A cell at the ceiling carries what of
+        the weight lies along the cable. Across itself a cable rests half on the body: newtons to the side, in
+        which opposite cables cancel. The forward model has all of it (model/effects/cable_mass.py); this is
+        for what reads tensions without a model.
+        """
+        length = np.array([cable.length for cable in self.cables])
+        carried = np.array([cable.load_cell == "ceiling" for cable in self.cables])
+        return np.asarray((self.cable_linear_density or 0.0) * self.gravity * length * carried * steepness)

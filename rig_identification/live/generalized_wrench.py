@@ -36,10 +36,14 @@ def generalized_wrench(
     """
     position, R = pose[:, :3], Rotation.from_quat(pose[:, 3:]).as_matrix()
     out = np.zeros((len(pose), 6))
+    hinges = np.array([cable.body_point for cable in rig.cables])
+    along = (
+        np.array([c.ceiling_point for c in rig.cables]) - position[:, None] - hinges @ R.transpose(0, 2, 1)
+    )
+    unit = along / np.linalg.norm(along, axis=2, keepdims=True)
+    pulls = (tension - rig.cable_weight_at_cells(unit[..., 2]))[..., None] * unit
     for i, cable in enumerate(rig.cables):
-        hinge = position + R @ cable.body_point
-        along = cable.ceiling_point - hinge
-        pull = tension[:, i : i + 1] * along / np.linalg.norm(along, axis=1, keepdims=True)
+        pull = pulls[:, i]
         _add(out, np.einsum("kji,kj->ki", R, pull), cable.body_point - center_of_mass)
     if rig.exciter is not None:
         turn = Rotation.from_quat(rig.exciter.orientation).as_matrix()

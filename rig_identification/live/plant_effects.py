@@ -117,7 +117,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.TURNING_CUBE] = effects.turning_cube
     physics[block + place.ADDED_MASS] = effects.air_added_mass
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
-    physics[block + place.LINEAR_DENSITY] = effects.cable_mass
+    physics[block + place.LINEAR_DENSITY] += effects.cable_mass
     rest = _rest(elastic.with_physics(physics))
     physics = elastic.with_physics(physics).referred(rest).physics
     physics[block + place.TETHER_STIFFNESS : block + place.TETHER_STIFFNESS + 3] = effects.tether

@@ -163,15 +163,18 @@ def leading(
     mass: float,
     notify: Notify,
     budget: Budget,
+    refused: int = 0,
 ) -> Trial | None:
     """The hypothesis with which, and with one more, nothing is left; None where there is none.
+
+    refused: so many of the first that were tried were asked before, and are not.
 
     Of two effects at once the one that takes most away alone may be neither: what bends to both does. What
     is left with either of the two shows the other one plainly.
     """
     best: tuple[float, Trial] | None = None
     least = min((excess(t.evaluation) for t in tried), default=0.0)
-    for trial in sorted(tried, key=lambda t: (t.candidate.build is not None, excess(t.evaluation))):
+    for trial in sorted(tried[refused:], key=lambda t: (t.candidate.build is not None, excess(t.evaluation))):
         if excess(trial.evaluation) > min(CHIEF * excess(before), RIVAL * least):
             continue
         if best is not None and trial.candidate.build is not None:

@@ -94,16 +94,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             name_in_result="added_mass",
             everywhere=True,
         ),
-        Candidate(
-            "cable_mass",
-            (added("cable.linear_density", "kg/m", 0.002 * mass / n, block + place.LINEAR_DENSITY),),
-            "The cables weigh {value}.",
-            "Weigh a length of the cable and enter it.",
-            {"channel": None, "axis": None},
-            positive=1,
-            name_in_result="linear_density",
-            everywhere=True,
-        ),
+        _cable_mass(rig, mass, block),
         *tethers(rig, mass),
     ]
     if rig.exciter is not None:
@@ -122,6 +113,22 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     if parameters.model.physics[block + place.GYROSCOPIC_SHARE] != 0.0:
         out.append(_gyroscopic_term(block, float(parameters.model.physics[block + place.GYROSCOPIC_SHARE])))
     return out
+
+
+def _cable_mass(rig: Rig, mass: float, block: int) -> Candidate:
+    """What all cables weigh; where the lab has weighed them, that they weigh something else."""
+    known = rig.cable_linear_density
+    std = 0.002 * mass / len(rig.cables)
+    return Candidate(
+        "cable_mass",
+        (added("cable.linear_density", "kg/m", std, block + place.LINEAR_DENSITY, known or 0.0),),
+        "The cables weigh {value}.",
+        "Weigh a metre of the cable and enter it as cable_linear_density.",
+        {"channel": None, "axis": None},
+        positive=1 if known is None else 0,
+        name_in_result="linear_density",
+        everywhere=known is None,
+    )
 
 
 def _less_the_rotor(problem: Problem, point: Point, evaluation: Evaluation) -> Point:

@@ -12,13 +12,14 @@ from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.first_fits import AT_NOISE
-from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain
+from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain, worth_a_fit
 from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.push import push_too
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import MOST_EFFECTS, Law, Trials, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
 from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.undecided import undecided_beside
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
 
 Notify = Callable[[str, float], None]
@@ -79,7 +80,10 @@ def named(
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = whole_runs(ideal, search)
         if _wholly(best):
-            return pruned(best, search, len(candidates))
+            kept = pruned(best, search, len(candidates))
+            # What the first may have stood in for is taken out before anything is looked for beside it
+            alone = kept is best and step + 1 < MOST_EFFECTS and not search.budget.spent()
+            return _one_more(ideal, search, kept, left, notify) if alone else kept
         if beside_push is not None and not search.whole and not search.budget.spent():
             pushed = push_too(ideal, search, notify)
             if pushed is not None:
@@ -106,6 +110,40 @@ def named(
             # Short pieces bend to anything that swings; what whole runs refute is no base to go on from
             break
     return fallback or best
+
+
+def _one_more(
+    ideal: Ideal, search: Search, best: Explained, candidates: list[Candidate], notify: Notify
+) -> Explained:
+    """What a hypothesis tells beside an explanation that leaves only noise, and no residual; or ``best``.
+
+    The same score test, and the same asking, as where the ideal model itself leaves only noise; and as there
+    the body's interval has in it what may be there.
+    """
+    notify("search: anything more within the noise", 0.9)
+    here, evaluation = best.fitted.problem, best.fitted.evaluation
+    left = compatible(candidates, [t.candidate for t in search.found])
+    promises = screen(here, evaluation, left, mass_of(here, evaluation))
+    if worth_a_fit(promises, count_of(left)):
+        beside = replace(
+            search, here=here, evaluation=evaluation, found=list(search.found), rivals=list(search.rivals)
+        )
+        tried = trials(
+            here,
+            evaluation,
+            left,
+            ORDINARY,
+            lambda label: notify(f"search: {label}", 0.92),
+            promises,
+            search.budget,
+        )
+        if tried.done:
+            beside.adopt(tried, tried.done[0])
+            notify("search: whole runs with " + ", ".join(t.candidate.label for t in beside.found), 0.95)
+            both = whole_runs(ideal, beside)
+            if _wholly(both):
+                return both
+    return undecided_beside(best, promises, count_of(left), notify, search.budget)
 
 
 def _wholly(found: Explained) -> bool:

@@ -155,6 +155,9 @@ def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
     step = run.grid.step
     a = round((start - MARGIN - run.offset) / step)
     b = round((end + MARGIN - run.offset) / step)
+    if b <= 0 or a >= run.grid.nodes - 1:
+        # Another stretch of the recording, from before or after the push
+        return [run]
     out = []
     if a * step > 1.0:
         out.append(run.between(0, a))

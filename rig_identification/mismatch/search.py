@@ -162,6 +162,7 @@ class _Look:
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
+    refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
     @property
     def count(self) -> int:
@@ -222,7 +223,11 @@ class _Look:
         """Far from the noise: what leaves nothing together with one more; see :func:`first_fits.leading`."""
         if not self.far or self.at_noise or not self.tried:
             return None
-        return leading(self.tried, self.seen, self.candidates, self.mass, self.notify, self.budget)
+        found = leading(
+            self.tried, self.seen, self.candidates, self.mass, self.notify, self.budget, self.refused
+        )
+        self.refused = len(self.tried)
+        return found
 
     def without_devices(self) -> None:
         """What is wrong with the device that contradicts all others, if one does."""

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import Budget
@@ -48,6 +49,45 @@ def undecided(
 
     promises: about ``evaluation``, of ``count`` hypotheses.
     """
+    stated = _neither_shown_nor_excluded(problem, evaluation, promises, count, notify, budget)
+    if not stated:
+        return None
+    mismatch = replace(
+        ideal.mismatch,
+        explanation=f"{ideal.mismatch.explanation} {_sentence(stated)}",
+        alternatives=tuple(rival(t, gap) for gap, t in stated),
+    )
+    return Explained(ideal.fitted, mismatch, ideal, bodies=_bodies(stated))
+
+
+def undecided_beside(
+    best: Explained, promises: list[Promise], count: int, notify: Notify, budget: Budget
+) -> Explained:
+    """An explanation that leaves only noise, with what may be there beside it in the body's interval.
+
+    It is no alternative to what is told, and stands in the explanation alone. promises: about its fit.
+    """
+    fitted = best.fitted
+    stated = _neither_shown_nor_excluded(fitted.problem, fitted.evaluation, promises, count, notify, budget)
+    if not stated:
+        return best
+    explanation = f"{best.mismatch.explanation} {_sentence(stated)}"
+    return replace(
+        best,
+        mismatch=replace(best.mismatch, explanation=explanation),
+        bodies=(*best.bodies, *_bodies(stated)),
+    )
+
+
+def _neither_shown_nor_excluded(
+    problem: Problem,
+    evaluation: Evaluation,
+    promises: list[Promise],
+    count: int,
+    notify: Notify,
+    budget: Budget,
+) -> list[tuple[float, Trial]]:
+    """Hypotheses that trail by little, and by how much (nats), best first."""
     nothing = log_evidence(evaluation)
 
     def chance(candidate: Candidate) -> float:
@@ -67,14 +107,14 @@ def undecided(
         gap = nothing + chance(promise.candidate) - ended.evidence
         if gap < TIED:
             stated.append((max(gap, 0.0), ended))
-    if not stated:
-        return None
-    stated.sort(key=lambda s: s[0])
+    return sorted(stated, key=lambda s: s[0])
+
+
+def _sentence(stated: list[tuple[float, Trial]]) -> str:
     named = " and ".join(dict.fromkeys(trial.candidate.effect for _, trial in stated))
-    mismatch = replace(
-        ideal.mismatch,
-        explanation=f"{ideal.mismatch.explanation} Whether there is {named} they neither show nor exclude.",
-        alternatives=tuple(rival(t, gap) for gap, t in stated),
-    )
-    bodies = tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in stated)
-    return Explained(ideal.fitted, mismatch, ideal, bodies=bodies)
+    return f"Whether there is {named} they neither show nor exclude."
+
+
+def _bodies(stated: list[tuple[float, Trial]]) -> Bodies:
+    """What each makes of the body."""
+    return tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in stated)

@@ -15,6 +15,7 @@ from rig_identification.model.effects.internal import STOP_FREQUENCY
 from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
+    LINEAR_DENSITY,
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
     SHARING,
@@ -121,6 +122,7 @@ def rig_model(
         physics[o + layout.CELL_AT_CEILING] = float(cable.load_cell == "ceiling")
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
     physics[layout.effects_offset(n) + CREEP] = CREEP_RATE
+    physics[layout.effects_offset(n) + LINEAR_DENSITY] = rig.cable_linear_density or 0.0
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic

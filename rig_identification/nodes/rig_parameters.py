@@ -15,8 +15,8 @@ from rig_identification.session.rig_description import rig_from_fields
 
 #: First parts of the rig description's names, besides the cables' own.
 RIG_KEYS = (
-    "gravity", "mass", "mass_std", "frame", "cables", "imu", "inclinometer", "exciter", "mocap", "noise",
-    "tolerance",
+    "gravity", "mass", "mass_std", "cable_linear_density", "frame", "cables", "imu", "inclinometer",
+    "exciter", "mocap", "noise", "tolerance",
 )  # fmt: skip
 #: Parameters that rclpy itself declares.
 _ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")

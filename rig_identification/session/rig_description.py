@@ -19,7 +19,17 @@ FARTHEST_ORIGIN = 10_000.0  # m
 LENGTH_HINT = "is it in mm? lengths are in m"
 _CABLE_KEYS = ("ceiling_point", "body_point", "length", "load_cell")
 _MOUNTS = ("imu", "inclinometer", "exciter", "mocap")
-_TOP_KEYS = ("gravity", "mass", "mass_std", "frame", "cables", *_MOUNTS, "noise", "tolerance")
+_TOP_KEYS = (
+    "gravity",
+    "mass",
+    "mass_std",
+    "cable_linear_density",
+    "frame",
+    "cables",
+    *_MOUNTS,
+    "noise",
+    "tolerance",
+)
 
 
 def read_rig(file: Path) -> Rig:
@@ -56,6 +66,7 @@ def rig_from_fields(top: Fields) -> Rig:
         cables=cables,
         mass=top.number("mass", "kg", above=0.0) if top.has("mass") else None,
         mass_std=top.number("mass_std", "kg", above=0.0) if top.has("mass_std") else None,
+        cable_linear_density=_linear_density(top),
         frame=_frame(top) if top.has("frame") else None,
         imu=_mount(top, "imu"),
         inclinometer=_mount(top, "inclinometer", with_position=False),
@@ -63,6 +74,14 @@ def rig_from_fields(top: Fields) -> Rig:
         mocap=_marker_mount(top),
         noise=_noise(top),
         tolerance=_tolerance(top),
+    )
+
+
+def _linear_density(top: Fields) -> float | None:
+    if not top.has("cable_linear_density"):
+        return None
+    return top.number(
+        "cable_linear_density", "kg/m", at_least=0.0, at_most=20.0, hint="weigh a metre of the cable"
     )
 
 

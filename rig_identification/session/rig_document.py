@@ -10,7 +10,7 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # xx xy xz yy yz zz
 def rig_document(rig: Rig) -> dict[str, object]:
     """Mapping that, dumped as YAML, is the rig description of ``rig``."""
     parameters: dict[str, object] = {"gravity": float(rig.gravity)}
-    for name in ("mass", "mass_std"):
+    for name in ("mass", "mass_std", "cable_linear_density"):
         if (value := getattr(rig, name)) is not None:
             parameters[name] = float(value)
     if rig.frame is not None:

@@ -223,7 +223,9 @@ class StaticModel:
         slope[:, self.belief_columns("zero")] = np.diag(self.tolerance[self.belief["zero"]])
         measured = np.isfinite(seen.tension)
         sharp = 1.0 / np.maximum(seen.tension_std[measured], SHARPEST_PART * weight)
-        error = ((1.0 + rig.gain) * pull + rig.zero)[measured] - seen.tension[measured]
+        unit = spans(rig.suspension, state.position[k], state.attitude[k])[3]
+        carried = pull + self.rig.cable_weight_at_cells(unit[:, 2])
+        error = ((1.0 + rig.gain) * carried + rig.zero)[measured] - seen.tension[measured]
         return sharp * error, sharp[:, None] * slope[measured]
 
     def anchor(self, state: StaticState) -> tuple[Array, Array]:
