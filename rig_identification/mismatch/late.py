@@ -11,13 +11,28 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import cost_in_motion
+from rig_identification.mismatch.screen import Promise
 
 if TYPE_CHECKING:
     from rig_identification.mismatch.trial import Trial
 
 #: What a run's start brings with it (s): what a lagging device showed before is not known.
 SETTLING = 1.0
+
+
+def lag_like(clock: Trial, candidates: Sequence[Candidate]) -> Promise | None:
+    """The lag of the device whose clock a trial finds late; None where it finds none late."""
+    if clock.candidate.effect != "clock_offset":
+        return None
+    values = clock.problem.bench.parameters.named(clock.evaluation.point.theta)
+    late = float(values[clock.candidate.parameters[0].name])
+    channel = clock.candidate.where.get("channel")
+    for lag in candidates:
+        if late > 0.0 and lag.effect == "sensor_lag" and lag.where.get("channel") == channel:
+            return Promise(lag, 0.0, {lag.parameters[0].name: late})
+    return None
 
 
 def told_apart(done: Sequence[Trial], meant: float) -> list[Trial]:

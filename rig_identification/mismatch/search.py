@@ -34,7 +34,7 @@ from rig_identification.mismatch.first_fits import (
 )
 from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
-from rig_identification.mismatch.late import told_apart
+from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
 from rig_identification.mismatch.screen import Promise, screen
@@ -42,6 +42,7 @@ from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
     Trial,
     amount_seen,
+    attempt,
     beyond_doubt,
     finished,
     log_evidence,
@@ -130,7 +131,7 @@ def trials(
         look.directly()
         lead = look.leading() if more else None
     if lead is not None:
-        return Trials([lead])
+        return Trials(look.told([lead]))
     if far and not look.at_noise:
         look.without_devices()
     if far and not look.at_noise:
@@ -229,6 +230,24 @@ class _Look:
         self.refused = len(self.tried)
         return found
 
+    def told(self, done: list[Trial]) -> list[Trial]:
+        """Trials, likeliest first, with the lag beside every late clock: to first order they are alike.
+
+        A clock that leaves only noise keeps its lag from being tried, and with one more effect it may leave
+        as little as the lag by itself.
+        """
+        out = list(done)
+        for clock in done:
+            lag = lag_like(clock, self.candidates)
+            if lag is None or any(t.candidate.label == lag.candidate.label for t in out):
+                continue
+            self.notify(lag.candidate.label)
+            begun = attempt(self.here, self.seen, lag, self.budget)
+            twin = None if begun is None else finished(begun, self.budget)
+            if twin is not None and twin.evidence > self.needed:
+                out.append(twin)
+        return told_apart(sorted(out, key=lambda t: -t.evidence), MEANT)
+
     def without_devices(self) -> None:
         """What is wrong with the device that contradicts all others, if one does."""
         if self.problem.bench.parameters.model.internal > 0:
@@ -294,7 +313,7 @@ class _Look:
             ended = self._fair(ended)
             if ended.evidence > self.needed:
                 _place(ended, beaten if last else done)
-        return Trials(told_apart(done, MEANT), self.device, tuple(beaten))
+        return Trials(self.told(done), self.device, tuple(beaten))
 
 
 def _place(trial: Trial, among: list[Trial]) -> None:
