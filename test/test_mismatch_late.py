@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter, lfilter_zi
+from test_simulate_identify import shaken
 
+from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.in_motion import cost_in_motion, unearned
 from rig_identification.mismatch.late import told_apart
+from rig_identification.recording import Recording
+from rig_identification.simulate import simulate_session
 
 SAMPLES, DURATION = 4000, 40.0
+#: s, of one load cell.
+LAG = 0.012
 
 
 def _fit(residual):  # type: ignore[no-untyped-def]
@@ -83,3 +90,23 @@ def test_a_lag_that_follows_the_body_better_stays_first() -> None:
     first, second = told_apart([lag, clock], 3.0)  # type: ignore[list-item]
     assert first.candidate.effect == "sensor_lag"
     assert first.evidence - second.evidence == 40.0
+
+
+def test_a_lag_is_told_before_the_clock_that_is_alike_to_it() -> None:
+    """The clock leaves next to nothing, and keeps the lag from being tried unless it is asked for."""
+    made, _ = simulate_session(shaken(14, 12.0), np.random.default_rng(8))
+    name = next(iter(made.recordings[-1].tension))
+    found = identify(replace(made, recordings=tuple(_slow(r, name) for r in made.recordings)))
+    assert found.mismatch.findings[0].effect == "sensor_lag"
+    assert found.mismatch.findings[0].where["channel"] == name
+    told = found.mismatch.findings[0].parameters["time_constant"]
+    assert abs(told["value"] - LAG) < 4.0 * told["std"]  # type: ignore[operator]
+
+
+def _slow(recording: Recording, name: str) -> Recording:
+    tension = recording.tension[name]
+    step = float(np.median(np.diff(tension.time)))
+    numerator, denominator, _ = cont2discrete(([1.0], [LAG, 1.0]), step, method="foh")
+    first = lfilter_zi(numerator[0], denominator) * tension.values[0, 0]
+    slow, _ = lfilter(numerator[0], denominator, tension.values[:, 0], zi=first)
+    return replace(recording, tension={**recording.tension, name: replace(tension, values=slow[:, None])})

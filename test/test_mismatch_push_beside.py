@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
+from rig_identification.estimate.identify import fit_session
 from rig_identification.mismatch.identify import identify
+from rig_identification.mismatch.locate import Event
+from rig_identification.mismatch.push import all_without
 from rig_identification.recording import Recording, Session
 from rig_identification.simulate import simulate_session
 
@@ -60,3 +63,22 @@ def test_both_are_named(session: Session) -> None:
     assert found.holdout_error is not None
     assert found.holdout_error < 1.1
     assert "push" in mismatch.explanation
+
+
+def test_a_push_leaves_other_stretches_of_its_recording_alone() -> None:
+    run = fit_session(simulate_session(shaken(14, 24.0), np.random.default_rng(3))[0], _quiet, None)
+    whole = run.problem.runs[0]
+    middle, last = whole.grid.nodes // 2, whole.grid.nodes - 1
+    early, late = whole.between(0, middle), whole.between(middle, last)
+    event = Event(whole.recording.name, 2.0, 3.0, run.evaluation.point, ())
+    before, after, untouched = all_without((early, late), event, 2.0, 3.0)
+    assert untouched is late
+    assert before.offset == early.offset
+    assert after.offset > 3.0
+    assert [r.offset for r in all_without((late,), replace(event, recording="another"), 2.0, 3.0)] == [
+        late.offset
+    ]
+
+
+def _quiet(stage: str, share: float) -> None:
+    """No progress is shown."""

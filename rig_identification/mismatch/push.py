@@ -49,7 +49,7 @@ def without_push(
         return None
     push, start, end = told
     for first, last in ((start, end), (event.start, event.end)):
-        whole = replace(problem, runs=_all_without(problem.runs, event, first, last))
+        whole = replace(problem, runs=all_without(problem.runs, event, first, last))
         fitted = fit_whole(ideal.fitted, whole, here, event.point)
         after, verdict = judged(fitted)
         if verdict.verdict == "none":
@@ -96,7 +96,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
     event = find_event(search.here, search.evaluation)
     if event is None or at_an_end(event, search.here):
         return None
-    runs = _all_without(search.problem.runs, event, event.start, event.end)
+    runs = all_without(search.problem.runs, event, event.start, event.end)
     found = whole_runs(ideal, replace(search, problem=replace(search.problem, runs=runs)))
     if found.mismatch.verdict != "explained" or found.trace:
         return None
@@ -106,7 +106,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
 def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
     """The ideal model fitted to all but the pieces that an event disturbs."""
     fitted = ideal.fitted
-    runs = _all_without(fitted.problem.runs, event, event.start, event.end)
+    runs = all_without(fitted.problem.runs, event, event.start, event.end)
     return fit_again(ideal, runs, (*fitted.holdout_runs, *fitted.lost), notify)
 
 
@@ -143,7 +143,7 @@ def _undisturbed(found: Explained, ideal: Ideal) -> Fitted | None:
     return fitted if judged(fitted)[1].verdict == "none" else None
 
 
-def _all_without(runs: tuple[Run, ...], event: Event, start: float, end: float) -> tuple[Run, ...]:
+def all_without(runs: tuple[Run, ...], event: Event, start: float, end: float) -> tuple[Run, ...]:
     """The stretches of all runs before and after a push."""
     return tuple(part for run in runs for part in _without(run, event, start, end))
 
