@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.rig import Rig
+from rig_identification.statics.balance import Suspension, spans
 
 Array = NDArray[np.float64]
 
@@ -36,15 +37,10 @@ def generalized_wrench(
     """
     position, R = pose[:, :3], Rotation.from_quat(pose[:, 3:]).as_matrix()
     out = np.zeros((len(pose), 6))
-    hinges = np.array([cable.body_point for cable in rig.cables])
-    along = (
-        np.array([c.ceiling_point for c in rig.cables]) - position[:, None] - hinges @ R.transpose(0, 2, 1)
-    )
-    unit = along / np.linalg.norm(along, axis=2, keepdims=True)
+    unit = spans(Suspension.of(rig), position, R)[3]
     pulls = (tension - rig.cable_weight_at_cells(unit[..., 2]))[..., None] * unit
     for i, cable in enumerate(rig.cables):
-        pull = pulls[:, i]
-        _add(out, np.einsum("kji,kj->ki", R, pull), cable.body_point - center_of_mass)
+        _add(out, np.einsum("kji,kj->ki", R, pulls[:, i]), cable.body_point - center_of_mass)
     if rig.exciter is not None:
         turn = Rotation.from_quat(rig.exciter.orientation).as_matrix()
         _add(out, exciter_force @ turn.T, rig.exciter.position - center_of_mass)

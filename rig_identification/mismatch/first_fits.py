@@ -38,10 +38,11 @@ FURTHER = 4
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
 SEEN = 4.0
 #: Near the noise: log evidence by which a hypothesis is beaten for good, and the share of what another one
-#: promised and kept that its promise must come to.
+#: promised and kept that its promise must come to; and the nats by which what changes the model has to have
+#: promised less than what took all away not to be tried beside it.
 BEATEN = 30.0
-NO_TIE = 10.0
 CLOSE = 0.7
+NO_TIE = 10.0
 
 
 def at_noise(trial: Trial) -> bool:
