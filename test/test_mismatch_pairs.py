@@ -15,7 +15,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.first_fits import leading
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, screen, with_reference
-from rig_identification.mismatch.trial import Trial, attempt, mass_of
+from rig_identification.mismatch.trial import Trial, attempt, finished, mass_of
 from rig_identification.simulate import simulate_session
 
 #: m: a ceiling hinge higher than described, many tolerances, which its three neighbours share among them.
@@ -79,7 +79,7 @@ def test_the_effect_that_leaves_the_other_one_plain_leads(two_at_once: tuple[Pro
         return trial
 
     right, wrong = tried("hinge_friction"), tried("hinge_damping")
-    found = leading([wrong, right], evaluation, candidates, mass, lambda stage: None, Budget())
+    found = leading([wrong, right], evaluation, candidates, mass, lambda stage: None, Budget(), finished)
     assert found is not None
     assert found.candidate.label == "hinge_friction"
-    assert leading([wrong], evaluation, candidates, mass, lambda stage: None, Budget()) is None
+    assert leading([wrong], evaluation, candidates, mass, lambda stage: None, Budget(), finished) is None

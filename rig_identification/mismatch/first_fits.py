@@ -164,26 +164,33 @@ def leading(
     mass: float,
     notify: Notify,
     budget: Budget,
+    finish: Callable[[Trial], Trial | None],
     refused: int = 0,
 ) -> Trial | None:
     """The hypothesis with which, and with one more, nothing is left; None where there is none.
 
-    refused: so many of the first that were tried were asked before, and are not.
+    finish: fits a trial to its end; None where its sign makes no sense. refused: so many of the first that
+    were tried were asked before, and are not.
 
     Of two effects at once the one that takes most away alone may be neither: what bends to both does. What
     is left with either of the two shows the other one plainly.
     """
     best: tuple[float, Trial] | None = None
     least = min((excess(t.evaluation) for t in tried), default=0.0)
+    ended: dict[str, float] = {}  # what is left of what was fitted to its end
     for trial in sorted(tried[refused:], key=lambda t: (t.candidate.build is not None, excess(t.evaluation))):
         if excess(trial.evaluation) > min(CHIEF * excess(before), RIVAL * least):
             continue
         if best is not None and trial.candidate.build is not None:
             # What changes the model and is fitted slowly may bend to anything
             break
-        first = finished(trial, budget)
+        if ended.get(trial.candidate.label, np.inf) <= excess(trial.evaluation):
+            # From elsewhere the same one came to less: this is on its way there
+            continue
+        first = finish(trial)
         if first is None:
             continue
+        ended[trial.candidate.label] = excess(first.evaluation)
         notify(f"{first.candidate.label}, and one more")
         others = compatible(candidates, [first.candidate])
         promises = screen(first.problem, first.evaluation, others, mass)

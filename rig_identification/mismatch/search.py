@@ -60,6 +60,9 @@ FINISHED = 3
 MOST_EFFECTS = 2
 #: Pieces that hypotheses are tried on; fewer where very much is left.
 TRIED, TRIED_FAR = 4, 2
+#: Share of what was left that no stand-in comes down to: one bends to most of what it stands in for, and
+#: leaves a part in ten or in a hundred of it.
+NEXT_TO_NONE = 1e-3
 #: Log evidence that an effect has to gain.
 MEANT = 3.0
 
@@ -132,13 +135,13 @@ def trials(
         lead = look.leading() if more else None
     if lead is not None:
         return Trials(look.told([lead]))
-    if far and not look.at_noise:
+    if far and not look.enough:
         look.without_devices()
-    if far and not look.at_noise:
+    if far and not look.enough:
         look.giving_way()
     if look.lawful is not None:
         return Trials([], lawful=look.lawful)
-    if far and not look.at_noise and not gives_way(problem.bench.parameters.model):
+    if far and not look.enough and not gives_way(problem.bench.parameters.model):
         look.begin(ringing_like(here, look.tried, seen, mass))
     if not far and not _without_support(look.tried, seen):
         look.yielding_a_little()
@@ -179,6 +182,14 @@ class _Look:
     def at_noise(self) -> bool:
         """Whether anything that was tried leaves only noise."""
         return any(at_noise(t) for t in self.tried)
+
+    @property
+    def enough(self) -> bool:
+        """Whether anything that was tried leaves only noise, or next to nothing and what looks like noise."""
+        return self.at_noise or any(
+            excess(t.evaluation) < NEXT_TO_NONE * excess(self.seen) and misfit(t.evaluation) < NEAR_SQUARE
+            for t in self.tried
+        )
 
     def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
         """First fits of promises about an evaluation; about another one's than ``seen`` all have a chance."""
@@ -225,10 +236,24 @@ class _Look:
         if not self.far or self.at_noise or not self.tried:
             return None
         found = leading(
-            self.tried, self.seen, self.candidates, self.mass, self.notify, self.budget, self.refused
+            list(self.tried),
+            self.seen,
+            self.candidates,
+            self.mass,
+            self.notify,
+            self.budget,
+            self.finished,
+            self.refused,
         )
         self.refused = len(self.tried)
         return found
+
+    def finished(self, trial: Trial) -> Trial | None:
+        """A trial fitted to its end, which takes its place among what was tried."""
+        ended = finished(trial, self.budget)
+        if ended is not None:
+            self.tried = [ended if t is trial else t for t in self.tried]
+        return ended
 
     def told(self, done: list[Trial]) -> list[Trial]:
         """Trials, likeliest first, with the lag beside every late clock: to first order they are alike.

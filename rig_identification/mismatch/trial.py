@@ -300,13 +300,20 @@ def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool
     return any(abs(values[p.name] - p.nominal) > limit * ordinary[p.name] for p in freed)
 
 
-def strength(trial: Trial) -> float:
-    """Gain (nats) of the trial's parameters over none of them, to second order (Wald)."""
+def strength(trial: Trial, ordinary: dict[str, float] | None = None) -> float:
+    """Gain (nats) of the trial's parameters over none of them, to second order (Wald).
+
+    ordinary: by name, how far off (own units) a model without them may have them; over none beyond that then.
+    """
+    within = ordinary or {}
     parameters = trial.problem.bench.parameters
     free = {p.name: p for p in parameters.free}
-    index = [parameters.index_of(p.name) for p in trial.candidate.parameters if not free[p.name].ratio]
-    if not index:
+    own = [free[p.name] for p in trial.candidate.parameters if not free[p.name].ratio]
+    if not own:
         return float(np.inf)
+    index = [parameters.index_of(p.name) for p in own]
     value = trial.evaluation.point.theta[index]
+    allowed = np.array([within.get(p.name, 0.0) / p.prior_std for p in own])
+    value = np.sign(value) * np.maximum(np.abs(value) - allowed, 0.0)
     covariance = invert_information(trial.evaluation.information)[np.ix_(index, index)]
     return 0.5 * float(value @ np.linalg.solve(covariance, value))

@@ -33,8 +33,9 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     point = replace(known, theta=carried(whole, here, known).theta)
     curved = any(t.candidate.curved for t in found)
     fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
-    # What says most comes first, whatever was found first
-    found = sorted(found, key=lambda t: -strength(_at(fitted, t)))
+    # What says most comes first, whatever was found first. Without its effect an error goes to its bound
+    bounds = {p.name: ORDINARY * p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
+    found = sorted(found, key=lambda t: -strength(_at(fitted, t), bounds))
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
     # a held-out run that cannot be followed, of which there is no residual to hear
