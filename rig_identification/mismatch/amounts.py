@@ -120,12 +120,8 @@ def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Prom
     rig, model = problem.bench.rig, problem.bench.parameters.model
     if gives_way(model):
         return []
-    # Near the noise little of it is seen: an amount that is not nearly right explains none of that
-    spaced = SPACED if misfit(evaluation) > NEAR_SQUARE else FINELY
-    stretches = usual_stiffness(rig, mass) * _spread(STRETCHES, spaced)
-    elasticity = cable_elasticity(rig, model, mass)
-    of_cables = Amount(problem, evaluation, elasticity, "cable.axial_stiffness")
-    found = [(of_cables, of_cables.best(list(stretches)))]
+    spaced = _spacing(evaluation)
+    found = [_stretching(problem, evaluation, mass)]
     sinks = list(largest_compliance(rig, mass) * _spread(SINKS, spaced))
     for axis, a in enumerate(AXES):
         ceilings = [ceiling_candidate(rig, model, mass, axis, frequency=f) for f in CEILING_FREQUENCIES]
@@ -136,6 +132,29 @@ def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Prom
     if out[first].gain > 0.0:
         out[first] = found[first][0].refined(out[first], spaced)
     return out
+
+
+def stretching(problem: Problem, evaluation: Evaluation, mass: float) -> Promise | None:
+    """Cables that stretch, at their best stiffness; None where the model gives way already."""
+    if gives_way(problem.bench.parameters.model):
+        return None
+    amount, promise = _stretching(problem, evaluation, mass)
+    return amount.refined(promise, _spacing(evaluation)) if promise.share > CHIEF else promise
+
+
+def _stretching(problem: Problem, evaluation: Evaluation, mass: float) -> tuple[Amount, Promise]:
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    amounts = usual_stiffness(rig, mass) * _spread(STRETCHES, _spacing(evaluation))
+    amount = Amount(problem, evaluation, cable_elasticity(rig, model, mass), "cable.axial_stiffness")
+    return amount, amount.best(list(amounts))
+
+
+def _spacing(evaluation: Evaluation) -> float:
+    """Factor between two amounts.
+
+    Near the noise little is seen: an amount that is not nearly right explains none of that.
+    """
+    return SPACED if misfit(evaluation) > NEAR_SQUARE else FINELY
 
 
 def brakes(problem: Problem, evaluation: Evaluation, promises: list[Promise]) -> list[Promise]:

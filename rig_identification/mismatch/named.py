@@ -37,6 +37,7 @@ def named(
     candidates = catalogue(search.problem)
     best: Explained | None = None
     fallback: Explained | None = None
+    uneven: tuple[Problem, Evaluation] | None = None  # pieces with an effect in that lack more
     for step in range(MOST_EFFECTS):
         if step and search.budget.spent():
             break
@@ -67,11 +68,11 @@ def named(
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         if misfit(search.evaluation) > EXPLAINED:
             # A push among pieces that all lack something stands out with that in the model
-            beside = None
             if beside_push is not None and not search.whole and not search.budget.spent():
-                beside = push_too(ideal, search, notify) or beside_push(search.here, search.evaluation)
-            if beside is not None:
-                return beside
+                beside = push_too(ideal, search, notify)
+                if beside is not None:
+                    return beside
+                uneven = uneven or (search.here, search.evaluation)
             if search.share < CHIEF:
                 # Two effects take nearly all away only where the first takes the larger part
                 break
@@ -109,7 +110,13 @@ def named(
         elif misfit(best.fitted.evaluation) > WRONG and first.candidate.build is not None:
             # Short pieces bend to anything that swings; what whole runs refute is no base to go on from
             break
-    return fallback or best
+    told = fallback or best
+    if told is not None and told.mismatch.verdict == "explained":
+        return told
+    if beside_push is not None and uneven is not None and not search.budget.spent():
+        # All is fitted anew outside of what stands out: only where one more effect does not explain it
+        return beside_push(*uneven) or told
+    return told
 
 
 def _one_more(

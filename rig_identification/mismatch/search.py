@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
-from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, supports
+from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
@@ -26,13 +26,12 @@ from rig_identification.mismatch.first_fits import (
     RIVAL,
     VERY_FAR,
     Notify,
-    almost,
     at_noise,
     begun,
     leading,
     shows,
 )
-from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
+from rig_identification.mismatch.hypotheses import count_of, slow, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
@@ -128,9 +127,11 @@ def trials(
             return Trials([one])
     look = _Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
     if misfit(seen) > VERY_FAR:
-        look.from_nothing_bent(guess)
+        look.outright()
+        if not look.enough:
+            look.from_nothing_bent(guess)
     lead = look.leading() if more else None
-    if lead is None and not look.at_noise and (not far or (promises and promises[0].share > DIRECT)):
+    if lead is None and not look.enough and (not far or (promises and promises[0].share > DIRECT)):
         look.directly()
         lead = look.leading() if more else None
     if lead is not None:
@@ -185,11 +186,11 @@ class _Look:
 
     @property
     def enough(self) -> bool:
-        """Whether anything that was tried leaves only noise, or next to nothing and what looks like noise."""
-        return self.at_noise or any(
-            excess(t.evaluation) < NEXT_TO_NONE * excess(self.seen) and misfit(t.evaluation) < NEAR_SQUARE
-            for t in self.tried
-        )
+        """Whether anything that was tried leaves only noise, or next to nothing of what was left."""
+        return any(self._enough(t) for t in self.tried)
+
+    def _enough(self, trial: Trial) -> bool:
+        return at_noise(trial) or excess(trial.evaluation) < NEXT_TO_NONE * excess(self.seen)
 
     def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
         """First fits of promises about an evaluation; about another one's than ``seen`` all have a chance."""
@@ -212,6 +213,14 @@ class _Look:
             worthy = [p for p in worthy if p.share > WORTH]
         self.begin(worthy)
 
+    def outright(self) -> None:
+        """What swings and promises nearly all, and cables that stretch where a stiffness takes that away."""
+        promised = [p for p in self.promises[:1] if slow(p.candidate) and p.share > DIRECT]
+        self.notify("cables that stretch")
+        stretched = stretching(self.here, self.seen, self.mass)
+        promised += [] if stretched is None or stretched.share < DIRECT else [stretched]
+        self.begin(promised)
+
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
         self.notify("from where nothing is bent")
@@ -222,14 +231,14 @@ class _Look:
         for promise in likely(self.promises, again):
             if self.budget.spent() or self.at_noise:
                 break
+            if any(t.settled and t.candidate.label == promise.candidate.label for t in self.tried):
+                # From what the other screening promised of it it is at its end already
+                continue
             self.notify(promise.candidate.label)
             trial = best_of(self.here, starts, promise, self.budget)
             if trial is None:
                 continue
             self.tried.append(trial)
-            if almost(trial, self.seen):
-                # What is left of it is for one more to take
-                break
 
     def leading(self) -> Trial | None:
         """Far from the noise: what leaves nothing together with one more; see :func:`first_fits.leading`."""
@@ -325,7 +334,7 @@ class _Look:
         done: list[Trial] = []
         beaten: list[Trial] = []
         for trial in tried:
-            last = any(at_noise(t) for t in done) and _beaten(trial, done, tried[0], self.far)
+            last = any(self._enough(t) for t in done) and _beaten(trial, done, tried[0], self.far)
             if len(done) == FINISHED or ((last or (done and self.budget.spent())) and not trial.settled):
                 continue
             self.notify(trial.candidate.label)
