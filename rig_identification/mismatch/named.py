@@ -11,6 +11,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import AT_NOISE
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain, worth_a_fit
 from rig_identification.mismatch.lawful import lawful_instead
@@ -63,6 +64,10 @@ def named(
             break
         before = replace(search, found=list(search.found), rivals=list(search.rivals))
         first = tried.done[0]
+        if not search.whole and not tried.chief:
+            # What takes a smaller part away stands in for something: a fit to all pieces says no more of it
+            search.rivals += [rival(t, first.evidence - t.evidence) for t in tried.done]
+            break
         search.adopt(tried, first)
         if not search.whole:
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)

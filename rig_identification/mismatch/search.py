@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve, still_promised
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
@@ -36,9 +36,10 @@ from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
-from rig_identification.mismatch.screen import Promise, screen
+from rig_identification.mismatch.screen import Promise, carried, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
+    FIRST_STEPS,
     Trial,
     amount_seen,
     attempt,
@@ -91,6 +92,7 @@ class Trials:
     liar: str | None = None
     beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
     lawful: Explained | None = None  # what explains the session instead
+    chief: bool = True  # whether the first takes the larger part of what was left away
 
 
 def trials(
@@ -231,14 +233,17 @@ class _Look:
         for promise in likely(self.promises, again):
             if self.budget.spent() or self.at_noise:
                 break
-            if any(t.settled and t.candidate.label == promise.candidate.label for t in self.tried):
-                # From what the other screening promised of it it is at its end already
+            if any(t.candidate.label == promise.candidate.label and self._decided(t) for t in self.tried):
                 continue
             self.notify(promise.candidate.label)
             trial = best_of(self.here, starts, promise, self.budget)
             if trial is None:
                 continue
             self.tried.append(trial)
+
+    def _decided(self, trial: Trial) -> bool:
+        """Whether starting a hypothesis from what the other screening promised of it is of no use."""
+        return trial.settled or excess(trial.evaluation) > CHIEF * excess(self.seen)
 
     def leading(self) -> Trial | None:
         """Far from the noise: what leaves nothing together with one more; see :func:`first_fits.leading`."""
@@ -325,6 +330,20 @@ class _Look:
         less = 0.0 if self.far else unearned(self.here, self.seen, trial.evaluation.runs)
         return replace(trial, evidence=log_evidence(trial.evaluation) - less)
 
+    def _missed(self, trial: Trial) -> bool:
+        """Whether more is left without a trial, about where it ends: a change of numbers alone.
+
+        Far along a curved valley an amount's std says little of how clear of none it lies.
+        """
+        if trial.candidate.build is not None:
+            return False
+        point = carried(self.here, trial.problem, trial.evaluation.point)
+        try:
+            without, _ = solve(self.here, point, iterations=FIRST_STEPS, tolerance=0.5)
+        except FloatingPointError:
+            return False
+        return trial.evidence > log_evidence(without) + MEANT
+
     def ended(self, limit: float) -> Trials:
         """The likeliest of what was tried, fitted to its end. limit: of ordinary errors, in tolerances."""
         if not self.tried:
@@ -341,13 +360,15 @@ class _Look:
             ended = finished(trial, self.budget)
             if ended is None or not beyond_doubt(ended, ordinary, limit):
                 continue
-            if not self.far and not amount_seen(ended):
+            if not self.far and not amount_seen(ended) and not self._missed(ended):
                 # It explains something, with an amount that may as well be none: it stands in for another
                 continue
             ended = self._fair(ended)
             if ended.evidence > self.needed:
                 _place(ended, beaten if last else done)
-        return Trials(self.told(done), self.device, tuple(beaten))
+        told = self.told(done)
+        chief = bool(told) and excess(told[0].evaluation) < CHIEF * excess(self.seen)
+        return Trials(told, self.device, tuple(beaten), chief=chief)
 
 
 def _place(trial: Trial, among: list[Trial]) -> None:
