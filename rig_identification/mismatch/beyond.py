@@ -66,6 +66,13 @@ class Beyond:
         seen = self._scale[:, None] * self.full.information[np.ix_(self.base, own)]
         return np.asarray(self.full.information[np.ix_(own, own)] - seen.T @ cho_solve(self._factor, seen))
 
+    def left_of(self, own: NDArray[np.int64]) -> Array:
+        """(c, c) information left of the base's unknowns ``own`` (c,), all others of it eliminated."""
+        at = np.searchsorted(self.base, own)
+        chosen = np.zeros((self.base.size, own.size))
+        chosen[at, np.arange(own.size)] = self._scale[at]
+        return np.asarray(np.linalg.inv(chosen.T @ cho_solve(self._factor, chosen)))
+
     def residuals(self, columns: Columns, amounts: Array, runs: Sequence[Array]) -> list[Array]:
         """Residuals (m,) of every run after the best step with ``amounts`` (c,) of the columns ``runs``."""
         rest = self._scale * self.full.gradient[self.base] - columns.seen @ amounts

@@ -44,16 +44,16 @@ Array = NDArray[np.float64]
 
 RATE, FORCE, ALPHA = layout.OUT_RATE, layout.OUT_SPECIFIC_FORCE, layout.OUT_ANGULAR_ACCELERATION
 #: Integration steps between two nodes.
-FINE = 8
+FINE = 16
 #: Ends of what is looked at: m either side, damping 1/s, frequency (Hz) of the stops and their damping ratio.
-TRAVELS, RATES, STOPS, RATIOS = (0.002, 0.1), (0.05, 8.0), (10.0, 80.0), (0.05, 0.9)
+TRAVELS, RATES, STOPS, RATIOS = (0.002, 0.1), (0.05, 8.0), (10.0, 160.0), (0.05, 0.9)
 BOUNDS = [(np.log(a), np.log(b)) for a, b in (TRAVELS, RATES, STOPS, RATIOS)] + [(-REACH, REACH)] * 3
 #: Differential evolution (Storn & Price, J. Global Optimization 11, 1997): members for each number that is
 #: looked for, generations, and how often anew. Of each scan's last members so many are heard for what they
 #: really gain; and from the best few of all, which differ by this much, steps of a simplex on that, and more
 #: of them from where the best of these comes to.
 PEOPLE, GENERATIONS, SEEDS, HEARD = 12, 60, (1, 2), 8
-STARTS, POLISHED = 3, (100, 200)
+STARTS, POLISHED = 3, (150, 300)
 ALIKE = np.array([0.25, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0])
 #: First steps of the simplex: in the logarithms, and in the place.
 NUDGES = (0.03, 0.2, 0.3, 0.3, 0.15, 0.15, 0.15)
@@ -187,6 +187,7 @@ class Along:
         if noisy.extra_noise is None:
             raise ValueError("there is no random wrench that a loose part could look like")
         self.evaluation, self._mass = evaluation, mass
+        self.most = FARTHEST * LIKELY * mass
         self._weight = 1.0 / np.diag(noisy.extra_noise)
         self._pairs = [
             (run.motion, latent)
@@ -203,7 +204,9 @@ class Along:
         for motion, latent in self._pairs:
             both = _alike(part.wrench(motion), latent, self._weight)
             shared, own = shared + both[0], own + both[1]
-        return 0.5 * max(shared, 0.0) ** 2 / max(own, 1e-300)
+        own = max(own, 1e-300)
+        mass = float(np.clip(shared / own, 0.0, self.most))
+        return mass * (shared - 0.5 * mass * own)
 
     def gain(self, part: Loose) -> Gain:
         """What a part really takes away."""
@@ -213,8 +216,9 @@ class Along:
         ]
         found = self._beyond.of(rows)
         information = float(found.information(rows)[0, 0]) + 1.0 / (LIKELY * self._mass) ** 2
-        mass = float(found.right[0]) / information
-        return Gain(0.5 * max(mass, 0.0) * float(found.right[0]), mass, float(information**-0.5))
+        right = float(found.right[0])
+        mass = float(np.clip(right / information, 0.0, self.most))
+        return Gain(mass * (right - 0.5 * mass * information), mass, float(information**-0.5))
 
 
 def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:

@@ -18,22 +18,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.identify import ORDINARY, Ideal
 from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.verdict import DOUBTED
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.screen import Promise
-from rig_identification.mismatch.trial import Trial, attempt, finished, log_evidence
+from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, log_evidence
 
 Notify = Callable[[str, float], None]
 
 #: Nats by which an explanation may trail and still be stated, and how many are, at most ("not worth more than
 #: a bare mention" up to one nat, "positive" up to three: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
-TIED, STATED = 3.0, 2
+TIED, STATED = 3.0, 3
+#: Of those that first order tells of so many are fitted at most: what it takes for little may be nothing.
+ASKED = 5
 
 
 def undecided(
@@ -90,19 +93,25 @@ def _neither_shown_nor_excluded(
     """Hypotheses that trail by little, and by how much (nats), best first."""
     nothing = log_evidence(evaluation)
 
+    ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
+
     def chance(candidate: Candidate) -> float:
-        return 0.0 if candidate.everywhere else float(np.log(count))
+        if candidate.everywhere:
+            return 0.0
+        return float(np.log(count / (DOUBTED if candidate.doubted else 1.0)))
 
     def trails(promise: Promise) -> float:
         return (promise.charge or 0.0) + chance(promise.candidate) - promise.gain
 
     close = [p for p in promises if p.charge is not None and trails(p) < TIED]
     stated: list[tuple[float, Trial]] = []
-    for promise in sorted(close, key=trails)[:STATED]:
+    for promise in sorted(close, key=trails)[:ASKED]:
+        if len(stated) == STATED:
+            break
         notify(f"search: {promise.candidate.label}, which may be there", 0.5)
         begun = attempt(problem, evaluation, promise, budget)
         ended = None if begun is None else finished(begun, budget)
-        if ended is None or not ended.settled:
+        if ended is None or not ended.settled or not beyond_doubt(ended, ordinary, ORDINARY):
             continue
         gap = nothing + chance(promise.candidate) - ended.evidence
         if gap < TIED:
