@@ -43,10 +43,8 @@ def _first(session: Session) -> tuple[Fitted, Trial | None, list[str]]:
     problem, evaluation = with_reference(fitted.problem, fitted.rest), fitted.evaluation
     candidates, mass = catalogue(problem), mass_of(problem, evaluation)
     promises, told = screen(problem, evaluation, candidates, mass), []
-    first = first_of_two(
-        problem, evaluation, promises, count_of(candidates), 3.0, 3.0, told.append, UNLIMITED
-    )
-    return fitted, first, told
+    led = first_of_two(problem, evaluation, promises, count_of(candidates), 3.0, 3.0, told.append, UNLIMITED)
+    return fitted, led.first if led is not None and led.leads else None, told
 
 
 @pytest.fixture(scope="module")

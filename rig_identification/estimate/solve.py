@@ -339,6 +339,10 @@ ROUNDING = 1e-9
 CREEP, CREPT = 0.01, 4
 
 
+#: Gain (nats) that a full step promises at most where a fit is at its end but for the residuals' spreads, and
+#: how often such a step may lose what it promises to win: it leads to where no residual asks for another one.
+#: The spreads' own slope, which is not in the Jacobian, lets the cost rise there by parts of a nat.
+AT_ROOT, LEAPS = 1.0, 3
 #: Gain (nats) that a full step may still promise where no step keeps it: the optimum is then within half a
 #: standard deviation.
 CLOSE = 0.125
@@ -407,7 +411,7 @@ def solve(
     current = evaluate(problem, point)
     if current is None:
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
-    damping, failed, creeping, idle, spent = 1e-6, 0.0, 0, 0, 0.0
+    damping, failed, creeping, idle, spent, against = 1e-6, 0.0, 0, 0, 0.0, 0
     for iteration in range(iterations):
         turned_back = False
         while True:
@@ -427,6 +431,8 @@ def solve(
                 change = _along_valley(problem, current, damping, change)
                 spent += 2.0 * QUICK
             moved, allowed = _moved(problem, current, change), current.cost + ROUNDING * abs(current.cost)
+            if damping <= 1e-3 and gain < AT_ROOT and against < LEAPS:
+                allowed += gain
             trial = evaluate(problem, moved, residuals_only=True) if wary else None
             spent += QUICK if wary else 0.0
             if not wary or (trial is not None and trial.cost < allowed):
@@ -437,6 +443,7 @@ def solve(
                     failed = 0.0
                 damping = damping if turned_back else max(damping * EASED, 1e-9)
                 won, current = current.cost - trial.cost, trial
+                against += won < 0.0
                 creeping = creeping + 1 if won < CREEP else 0
                 if creeping == CREPT:
                     return current, _as_good_as_settled(problem, current)

@@ -12,6 +12,9 @@ from rig_identification.model.motion import RigModel
 #: Name in result.json -> (value, std, unit) of a fitted candidate's parameters.
 Told = dict[str, tuple[float, float, str]]
 
+#: Parameters of its own that make the fits of a hypothesis slow: those of a hose or a rider.
+MANY = 6
+
 #: What an effect makes of a rig's model, and its parameters there.
 Build = Callable[[RigModel], tuple[RigModel, tuple[Parameter, ...]]]
 
@@ -42,6 +45,11 @@ class Candidate:
     def doubted(self) -> bool:
         """Whether the lab doubts these numbers itself: nothing is added to the model."""
         return all(p.freed for p in self.parameters)
+
+    @property
+    def slow(self) -> bool:
+        """Whether a fit takes ten times as long as that of a sensor's error."""
+        return self.build is not None or len(self.parameters) >= MANY
 
     @property
     def label(self) -> str:

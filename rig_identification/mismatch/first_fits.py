@@ -16,7 +16,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import compatible, count_of, slow, worth_a_fit
+from rig_identification.mismatch.hypotheses import compatible, count_of, worth_a_fit
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import Trial, attempt, finished
@@ -101,7 +101,7 @@ class _Standing:
         """Whether another one left nothing, or next to nothing, and much more was expected of it."""
         if promise.candidate.build is not None and (self.enough or promise.gain < CLOSE * self.reached):
             return True
-        return promise.gain < CLOSE * self.nearly and slow(promise.candidate)
+        return promise.gain < CLOSE * self.nearly and promise.candidate.slow
 
     def heard(self, promise: Promise, trial: Trial, before: Evaluation, first: bool) -> None:
         """Take a first fit into account. before: without it; first: of the likeliest promise."""
@@ -122,11 +122,13 @@ def begun(
     notify: Notify,
     budget: Budget,
     instead: Callable[[], bool] | None = None,
+    known: Trial | None = None,
 ) -> list[Trial]:
     """First, short fits of promises. far: much is left, and one that reaches the noise is no chance.
 
     instead: whether something else explains it all, so that nothing more is begun; asked where nothing that
     is fitted soon or promises the larger part leaves only noise, before what is slow and promises less.
+    known: what is fitted already.
     """
     standing = _Standing(far, gives_way(problem.bench.parameters.model), budget)
     if not far:
@@ -145,7 +147,8 @@ def begun(
             if explained:
                 return standing.out
         notify(promise.candidate.label)
-        trial = attempt(problem, evaluation, promise, budget)
+        fitted = known is not None and known.candidate.label == promise.candidate.label
+        trial = known if fitted else attempt(problem, evaluation, promise, budget)
         if trial is not None and far and (almost(trial, evaluation) or _coarse(trial, evaluation)):
             # Worth its last steps before any other is tried
             trial = finished(trial, budget) or trial

@@ -9,7 +9,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH
-from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.candidate import MANY, Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.riders import SWINGS
@@ -21,7 +21,7 @@ from rig_identification.mismatch.sensor_errors import sensor_errors
 FITTED = 4
 #: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
 #: parameters of its own as a hose or a rider has, whose fits are slow and whose place is found already.
-ALIKE, ALIKE_IF_MANY, MANY = 3, 2, 6
+ALIKE, ALIKE_IF_MANY = 3, 2
 
 
 def catalogue(problem: Problem) -> list[Candidate]:
@@ -73,8 +73,3 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
         if p.gain > WORTH * worthy[0].gain and alike < most and len(out) < FITTED:
             out.append(p)
     return out
-
-
-def slow(candidate: Candidate) -> bool:
-    """Whether a fit takes ten times as long as that of a sensor's error."""
-    return candidate.build is not None or len(candidate.parameters) >= MANY

@@ -9,13 +9,13 @@ single hypothesis even so, and its fit keeps that, the search begins with the on
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import compatible, needed_gain, slow
+from rig_identification.mismatch.hypotheses import compatible, needed_gain
 from rig_identification.mismatch.screen import Promise, promises_of, together
 from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished
 
@@ -23,6 +23,14 @@ Notify = Callable[[str], None]
 
 #: Hypotheses that promise most, of which pairs are made.
 PAIRED = 24
+
+
+@dataclass(frozen=True)
+class Led:
+    """The hypothesis of a pair that says more alone, fitted to its end."""
+
+    first: Trial
+    leads: bool  # whether the fit of both keeps what the pair promised
 
 
 def first_of_two(
@@ -34,14 +42,14 @@ def first_of_two(
     limit: float,
     notify: Notify,
     budget: Budget,
-) -> Trial | None:
-    """The one of a pair to begin with; None where no pair is worth more than any single hypothesis.
+) -> Led | None:
+    """The one of a pair to begin with; None where no pair promises more than any single hypothesis.
 
     promises: of all hypotheses about ``evaluation``, best first; count: of all hypotheses. ahead: nats by
     which a pair has to be worth more. limit: of ordinary errors, in tolerances.
     """
     alone = max((p.gain - needed_gain(p.candidate, count) for p in promises), default=0.0)
-    likely = {p.candidate.label: p for p in promises if not slow(p.candidate) and p.candidate.settle is None}
+    likely = {p.candidate.label: p for p in promises if not p.candidate.slow and p.candidate.settle is None}
     plain = list(likely.values())[:PAIRED]
     pairs = [
         (a.candidate, b.candidate)
@@ -63,11 +71,11 @@ def first_of_two(
     (promise,) = promises_of(first.problem, first.evaluation, [other])
     second = attempt(first.problem, first.evaluation, promise, budget)
     if second is None:
-        return None
+        return Led(first, False)
     ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
     kept = evaluation.cost - second.evaluation.cost - _cost((one, other), count) > max(alone, 0.0) + ahead
     meant = all(beyond_doubt(replace(second, candidate=c), ordinary, limit) for c in (one, other))
-    return first if kept and meant else None
+    return Led(first, kept and meant)
 
 
 def _cost(pair: tuple[Candidate, Candidate], count: int) -> float:

@@ -31,7 +31,7 @@ from rig_identification.mismatch.first_fits import (
     leading,
     shows,
 )
-from rig_identification.mismatch.hypotheses import count_of, slow, worth_a_fit
+from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
@@ -123,11 +123,14 @@ def trials(
         problem, evaluation = worst_pieces(problem, evaluation)
     promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
+    led = None
     if more and not far:
-        one = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
-        if one is not None:
-            return Trials([one])
+        led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
+        if led is not None and led.leads:
+            return Trials([led.first])
     look = _Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
+    if led is not None and here is problem:
+        look.fitted = led.first
     if misfit(seen) > VERY_FAR:
         look.outright()
         if not look.enough:
@@ -166,6 +169,7 @@ class _Look:
     notify: Notify
     budget: Budget
     law: Law | None
+    fitted: Trial | None = None  # before, to ``here`` about ``seen``
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
@@ -197,7 +201,9 @@ class _Look:
     def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
         """First fits of promises about an evaluation; about another one's than ``seen`` all have a chance."""
         far = self.far and about is None
-        self.tried += begun(self.here, about or self.seen, worthy, far, self.notify, self.budget)
+        self.tried += begun(
+            self.here, about or self.seen, worthy, far, self.notify, self.budget, known=self.fitted
+        )
 
     def untried(self, promises: list[Promise]) -> list[Promise]:
         """Promises of what has not been tried."""
@@ -217,7 +223,7 @@ class _Look:
 
     def outright(self) -> None:
         """What swings and promises nearly all, and cables that stretch where a stiffness takes that away."""
-        promised = [p for p in self.promises[:1] if slow(p.candidate) and p.share > DIRECT]
+        promised = [p for p in self.promises[:1] if p.candidate.slow and p.share > DIRECT]
         self.notify("cables that stretch")
         stretched = stretching(self.here, self.seen, self.mass)
         promised += [] if stretched is None or stretched.share < DIRECT else [stretched]

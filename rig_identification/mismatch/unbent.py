@@ -20,7 +20,6 @@ from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.budget import Budget
-from rig_identification.mismatch.hypotheses import slow
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial, attempt
 
@@ -48,7 +47,7 @@ def at_first(problem: Problem, evaluation: Evaluation, theta: NDArray[np.float64
 
 def likely(*screened: list[Promise]) -> list[Promise]:
     """Of promises, best first, those that are tried, in turn: fits that take a second or two."""
-    soon = [[p for p in promises if not slow(p.candidate)][:MOST] for promises in screened]
+    soon = [[p for p in promises if not p.candidate.slow][:MOST] for promises in screened]
     return [p for turn in zip_longest(*soon) for p in turn if p is not None]
 
 
