@@ -12,7 +12,10 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import fit_session
-from rig_identification.mismatch.loose import Loose, loose_finding
+from rig_identification.mismatch.loose import Along, Loose, loose_finding
+from rig_identification.mismatch.measured import measured
+from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.trial import mass_of
 from rig_identification.model import layout
 from rig_identification.model.equilibrium import find_rest, settle
 from rig_identification.model.motion import RigModel, simulate
@@ -106,6 +109,27 @@ def test_a_loose_part_is_told_with_its_axis_and_mass() -> None:
     assert isinstance(value, float)
     assert isinstance(std, float)
     assert abs(value - 12.0) < 3.0 * std
+
+
+def test_a_loose_part_that_has_to_weigh_too_much_gains_by_what_it_may_weigh() -> None:
+    """A way of two millimetres looks like a hundred kilograms; the likeliest part of that is the heaviest."""
+    fit = fitted({"hinge_damping": (25.0,)})
+    problem, point = with_reference(fit.problem, fit.rest), fit.evaluation.point
+    mass = mass_of(problem, fit.evaluation)
+    seen = measured(problem, point, mass)
+    assert seen is not None
+    along = Along(*seen, mass)
+    along.most = np.inf
+    parts = [Loose(axis, 0.002, 0.5, 40.0, 0.4, side * AT) for axis in "xy" for side in (1.0, -1.0)]
+    part = max(parts, key=lambda p: along.gain(p).nats)
+    free, alike = along.gain(part), along.likeness(part)
+    assert free.mass > 0.0
+    along.most = 0.5 * free.mass
+    held = along.gain(part)
+    assert held.mass == pytest.approx(along.most)
+    # Of a parabola half way to its top
+    assert held.nats == pytest.approx(0.75 * free.nats)
+    assert along.likeness(part) <= alike
 
 
 @pytest.mark.parametrize(

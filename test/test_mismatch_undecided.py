@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
+from rig_identification.estimate.identify import fit_session
+from rig_identification.estimate.solve import evaluate
+from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.identify import identify
+from rig_identification.mismatch.screen import carried, extended, screen, with_reference
+from rig_identification.mismatch.trial import log_evidence, mass_of
 from rig_identification.result import Identification
 from rig_identification.simulate import simulate_session
 
@@ -77,3 +82,21 @@ def test_a_clean_session_states_only_what_every_rig_has(clean: tuple[Identificat
     assert not found.mismatch.findings
     assert {a["effect"] for a in found.mismatch.alternatives} <= {"cable_mass", "air_added_mass"}
     assert np.max(np.abs(deviation)) < 3.5
+
+
+def test_what_a_freed_doubt_is_charged_is_what_evidence_takes_for_it() -> None:
+    """Laplace's charge for a tolerance let go: by how much less sharp the fit's information is without it."""
+    spec = replace(shaken(10, 10.0), doubts=False)
+    fitted = fit_session(simulate_session(spec, np.random.default_rng(2))[0])
+    problem, evaluation = with_reference(fitted.problem, fitted.rest), fitted.evaluation
+    candidates = [c for c in catalogue(problem) if c.effect in ("cable_length", "hinge_position")][:6]
+    before = log_evidence(evaluation)
+    for promise in screen(problem, evaluation, candidates, mass_of(problem, evaluation)):
+        if promise.candidate not in candidates:
+            continue
+        wide = extended(problem, (promise.candidate,))
+        there = evaluate(wide, carried(wide, problem, evaluation.point))
+        assert there is not None
+        charged = before - log_evidence(there) - (there.cost - evaluation.cost)
+        assert promise.charge == pytest.approx(charged, abs=0.02)
+        assert charged > 0.5

@@ -208,23 +208,25 @@ def _charge(wide: Problem, beyond: Beyond, candidate: Candidate) -> float | None
     """Half the log of how much sharper than its prior a candidate's parameters are known (Laplace).
 
     What is only freed is known anyway: half the log of how much wider its prior becomes than what is known.
-    None where some of them are held at their bound, or are free and others added.
+    None where some of its parameters are free already and others are not.
     """
     own = np.array([wide.bench.parameters.index_of(q.name) for q in candidate.parameters])
-    known = np.isin(own, beyond.base)
-    if known.any() != candidate.doubted or known.any() != known.all():
+    open_ = np.isin(own, beyond.base)
+    if open_.any() != open_.all() or (open_.any() and not candidate.doubted):
         return None
-    if not candidate.doubted:
-        sign, log_det = np.linalg.slogdet(beyond.within(own))
-        return 0.5 * float(log_det) if sign > 0 else None
-    free = wide.bench.parameters.free
-    wider = np.array(
-        [q.prior_std / free[i - INERTIAL].prior_std for q, i in zip(candidate.parameters, own, strict=True)]
-    )
-    believed, one = beyond.left_of(own), np.eye(own.size)
-    freed = np.outer(wider, wider) * (believed - one) + one
-    (sign, after), (other, before) = np.linalg.slogdet(freed), np.linalg.slogdet(believed)
-    return 0.5 * float(after - before) if min(sign, other) > 0 else None
+    believed = beyond.left_of(own) if open_.any() else beyond.within(own)
+    (sign, after), before = np.linalg.slogdet(believed), 0.0
+    if candidate.doubted:
+        free, one = wide.bench.parameters.free, np.eye(own.size)
+        wider = np.array(
+            [
+                q.prior_std / free[i - INERTIAL].prior_std
+                for q, i in zip(candidate.parameters, own, strict=True)
+            ]
+        )
+        before = float(after)
+        sign, after = np.linalg.slogdet(np.outer(wider, wider) * (believed - one) + one)
+    return 0.5 * float(after - before) if sign > 0 else None
 
 
 def _with(candidate: Candidate, column: dict[str, int]):  # type: ignore[no-untyped-def]
