@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
@@ -39,6 +40,8 @@ def named(
     best: Explained | None = None
     fallback: Explained | None = None
     uneven: tuple[Problem, Evaluation] | None = None  # pieces with an effect in that lack more
+    led = False  # what is in the model waits for another one
+    lawful: Callable[[], Explained | None] | None = None  # what tells whether a law explains it all instead
     for step in range(MOST_EFFECTS):
         if step and search.budget.spent():
             break
@@ -71,6 +74,10 @@ def named(
         search.adopt(tried, first)
         if not search.whole:
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
+        led = tried.led and step + 1 < MOST_EFFECTS and not search.budget.spent()
+        if led:
+            # With one more nothing is left: there is no use in whole runs without it
+            continue
         if misfit(search.evaluation) > EXPLAINED:
             # A push among pieces that all lack something stands out with that in the model
             if beside_push is not None and not search.whole and not search.budget.spent():
@@ -94,11 +101,13 @@ def named(
             pushed = push_too(ideal, search, notify)
             if pushed is not None:
                 return pushed
-        if law is not None and not step and not before.whole and not search.budget.spent():
-            notify("search: a force that follows one point's motion", at)
-            told = lawful_instead(ideal, before, notify, first)
-            if told is not None:
-                return told
+        if law is not None and not step and not before.whole:
+            lawful = partial(lawful_instead, ideal, before, notify, first)
+            if best.mismatch.verdict != "explained":
+                told = _lawful(lawful, search, notify)
+                lawful = None
+                if told is not None:
+                    return told
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best
@@ -115,13 +124,25 @@ def named(
         elif misfit(best.fitted.evaluation) > WRONG and first.candidate.build is not None:
             # Short pieces bend to anything that swings; what whole runs refute is no base to go on from
             break
+    if led:
+        # The one that it waits for was not found again
+        best = whole_runs(ideal, search)
     told = fallback or best
     if told is not None and told.mismatch.verdict == "explained":
-        return told
+        # What leaves a trace may stand in for a law, which is asked where no second effect is that trace
+        return (_lawful(lawful, search, notify) if lawful is not None else None) or told
     if beside_push is not None and uneven is not None and not search.budget.spent():
         # All is fitted anew outside of what stands out: only where one more effect does not explain it
         return beside_push(*uneven) or told
     return told
+
+
+def _lawful(asked: Callable[[], Explained | None], search: Search, notify: Notify) -> Explained | None:
+    """The law that explains it all instead, if one does."""
+    if search.budget.spent():
+        return None
+    notify("search: a force that follows one point's motion", 0.8)
+    return asked()
 
 
 def _one_more(

@@ -22,6 +22,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.first_fits import (
     BEATEN,
+    CLOSE,
     DIRECT,
     RIVAL,
     VERY_FAR,
@@ -92,6 +93,7 @@ class Trials:
     liar: str | None = None
     beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
     lawful: Explained | None = None  # what explains the session instead
+    led: bool = False  # the first leads to another one, with which nothing is left
     chief: bool = True  # whether the first takes the larger part of what was left away
 
 
@@ -140,7 +142,7 @@ def trials(
         look.directly()
         lead = look.leading() if more else None
     if lead is not None:
-        return Trials(look.told([lead]))
+        return Trials(look.told([lead]), led=True)
     if far and not look.enough:
         look.without_devices()
     if far and not look.enough:
@@ -222,8 +224,14 @@ class _Look:
         self.begin(worthy)
 
     def outright(self) -> None:
-        """What swings and promises nearly all, and cables that stretch where a stiffness takes that away."""
-        promised = [p for p in self.promises[:1] if p.candidate.slow and p.share > DIRECT]
+        """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.
+
+        A hose bends to an error of one length or hinge, which promises as much with one number of its own.
+        """
+        soon = max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
+        promised = [
+            p for p in self.promises[:1] if p.candidate.slow and p.share > DIRECT and soon < CLOSE * p.gain
+        ]
         self.notify("cables that stretch")
         stretched = stretching(self.here, self.seen, self.mass)
         promised += [] if stretched is None or stretched.share < DIRECT else [stretched]

@@ -232,9 +232,14 @@ def _with_amount(problem: Problem, candidate: Candidate, point: Point) -> Point:
 def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
     """The trial fitted to its end, as its closest description has it; None where its sign makes no sense.
 
-    Where the ``budget`` is spent it stays where it is.
+    A closer description is fitted from where the first steps led: what is not one fits by running away from
+    there. Where the ``budget`` is spent it stays where it is.
     """
     stop = budget.spent
+    if trial.candidate.closer is not None and not trial.settled and not stop():
+        best = _closest(trial, stop)
+        if best is not None and best.evidence > trial.evidence:
+            return best
     if not trial.settled and not stop():
         fitted, _ = solve(
             trial.problem,
@@ -250,12 +255,22 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
         return None
     if trial.candidate.closer is None or stop():
         return trial
+    best = _closest(trial, stop)
+    if best is not None and best.evidence > trial.evidence:
+        return best
+    return replace(trial, candidate=replace(trial.candidate, closer=None))
+
+
+def _closest(trial: Trial, stop: Stop) -> Trial | None:
+    """The likeliest closer description of a trial's effect; None where none makes sense."""
+    if trial.candidate.closer is None:
+        return None
     closer = (
         _described(trial, candidate, values, stop)
         for candidate, values in trial.candidate.closer(trial.problem, trial.evaluation)
     )
-    best = max((trial, *(t for t in closer if t is not None and _sensible(t))), key=lambda t: t.evidence)
-    return replace(best, candidate=replace(best.candidate, closer=None))
+    sensible = [replace(t, candidate=replace(t.candidate, closer=None)) for t in closer if t and _sensible(t)]
+    return max(sensible, key=lambda t: t.evidence, default=None)
 
 
 def _sensible(trial: Trial) -> bool:
