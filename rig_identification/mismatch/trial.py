@@ -134,10 +134,22 @@ def attempt(
             point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE, stop)
             fitted, settled = _first_steps(wide, point, CHANGED_STEPS, stop)
         else:
-            fitted, settled = _from_promise(wide, point, begun, promise.gain, candidate.slow, stop)
+            fitted, settled = _from_promise(
+                wide, point, _placed(begun, point, wide, candidate), promise.gain, stop
+            )
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+
+
+def _placed(begun: Point, promised: Point, problem: Problem, candidate: Candidate) -> Point:
+    """Where a fit stands, with what has no amount yet at its promised place: there it tells its amount."""
+    theta = begun.theta.copy()
+    for p in candidate.parameters:
+        if ".point." in p.name:
+            i = problem.bench.parameters.index_of(p.name)
+            theta[i] = promised.theta[i]
+    return replace(begun, theta=theta)
 
 
 def _first_steps(problem: Problem, point: Point, steps: int, stop: Stop) -> tuple[Evaluation, bool]:
@@ -145,7 +157,7 @@ def _first_steps(problem: Problem, point: Point, steps: int, stop: Stop) -> tupl
 
 
 def _from_promise(
-    problem: Problem, promised: Point, begun: Point, gain: float, many: bool, stop: Stop
+    problem: Problem, promised: Point, begun: Point, gain: float, stop: Stop
 ) -> tuple[Evaluation, bool]:
     """First steps of a fit that does not change the model, from where it stands (``begun``) or a promise.
 
@@ -153,8 +165,7 @@ def _from_promise(
     throws everything out by more than the whole effect; yet Gauss-Newton steps from there are soon back on
     the valley's floor, far along it, where descent from where the fit stands follows every bend. Where they
     are not, that is what is left to do. Near the noise hardly anything bends: steps from where the fit stands
-    come to what was promised (``gain``, nats), and only where they do not the promise is tried; not that of
-    ``many`` numbers, whose fits take ten times as long.
+    come to what was promised (``gain``, nats), and only where they do not the promise is tried.
     """
     there, here = (evaluate(problem, p, residuals_only=True) for p in (promised, begun))
     if there is None:
@@ -164,7 +175,7 @@ def _from_promise(
     straight = None
     if misfit(here) < NEAR_SQUARE:
         straight = _first_steps(problem, begun, FIRST_STEPS, stop)
-        if here.cost - straight[0].cost > KEPT * gain or many:
+        if here.cost - straight[0].cost > KEPT * gain:
             return straight
     fitted, settled = _first_steps(problem, promised, RETURNING_STEPS, stop)
     if fitted.cost > min(here.cost, np.inf if straight is None else straight[0].cost):

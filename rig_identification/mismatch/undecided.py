@@ -32,11 +32,12 @@ from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, fini
 
 Notify = Callable[[str, float], None]
 
-#: Nats by which an explanation may trail and still be stated, and how many are, at most ("not worth more than
-#: a bare mention" up to one nat, "positive" up to three: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
+#: Nats by which an explanation may trail and still be stated, and how many effects are, at most ("not worth
+#: more than a bare mention" up to one nat, "positive" up to three: Kass and Raftery, J. Am. Stat. Assoc. 90,
+#: 1995).
 TIED, STATED = 3.0, 3
 #: Of those that first order tells of so many are fitted at most: what it takes for little may be nothing.
-ASKED = 5
+ASKED = 6
 
 
 def undecided(
@@ -108,6 +109,9 @@ def _neither_shown_nor_excluded(
     for promise in sorted(close, key=trails)[:ASKED]:
         if len(stated) == STATED:
             break
+        if any(t.candidate.effect == promise.candidate.effect for _, t in stated):
+            # Its other places are its rivals anyway
+            continue
         notify(f"search: {promise.candidate.label}, which may be there", 0.5)
         begun = attempt(problem, evaluation, promise, budget)
         ended = None if begun is None else finished(begun, budget)
