@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from scipy.spatial.transform import Rotation
 pytest.importorskip(
     "mujoco", reason="MuJoCo is missing: THE CONCEALED ENGINE IS NOT TESTED (pip install mujoco)"
 )
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench.concealed.draw import draw_scene
 from bench.concealed.effects import CATALOGUE, OUTSIDE

@@ -306,7 +306,7 @@ def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:
         return None
     along = Along(*seen, mass)
     part, gain = likeliest(along, middle_of(problem.bench.rig), spread_of(problem))
-    likely = gain.nats > AHEAD and gain.mass < FARTHEST * LIKELY * mass
+    likely = gain.nats > AHEAD and gain.mass < along.most
     held = _held_out(fitted, problem, mass) if likely else None
     again = None if held is None else held.gain(part)
     if again is None or again.nats < CONFIRMED:

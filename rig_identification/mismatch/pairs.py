@@ -17,7 +17,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, needed_gain
 from rig_identification.mismatch.screen import Promise, promises_of, together
-from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished
+from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, ordinary_errors
 
 Notify = Callable[[str], None]
 
@@ -72,7 +72,7 @@ def first_of_two(
     second = attempt(first.problem, first.evaluation, promise, budget)
     if second is None:
         return Led(first, False)
-    ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
+    ordinary = ordinary_errors(problem)
     kept = evaluation.cost - second.evaluation.cost - _cost((one, other), count) > max(alone, 0.0) + ahead
     meant = all(beyond_doubt(replace(second, candidate=c), ordinary, limit) for c in (one, other))
     return Led(first, kept and meant)

@@ -48,6 +48,7 @@ from rig_identification.mismatch.trial import (
     finished,
     log_evidence,
     mass_of,
+    ordinary_errors,
 )
 from rig_identification.mismatch.unbent import at_first, best_of, likely, unbent
 
@@ -362,7 +363,7 @@ class _Look:
         """The likeliest of what was tried, fitted to its end. limit: of ordinary errors, in tolerances."""
         if not self.tried:
             return Trials([], self.device)
-        ordinary = {p.name: p.prior_std for p in self.problem.bench.parameters.free if p.bounded}
+        ordinary = ordinary_errors(self.problem)
         tried = sorted((self._fair(t) for t in self.tried), key=lambda t: -t.evidence)
         done: list[Trial] = []
         beaten: list[Trial] = []

@@ -247,10 +247,10 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
     there. Where the ``budget`` is spent it stays where it is.
     """
     stop = budget.spent
-    if trial.candidate.closer is not None and not trial.settled and not stop():
-        best = _closest(trial, stop)
-        if best is not None and best.evidence > trial.evidence:
-            return best
+    if not trial.settled and not stop():
+        closest = _closest(trial, stop)
+        if closest is not trial:
+            return replace(closest, candidate=replace(closest.candidate, closer=None))
     if not trial.settled and not stop():
         fitted, _ = solve(
             trial.problem,
@@ -264,24 +264,21 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
     if not _sensible(trial):
         return None
-    if trial.candidate.closer is None or stop():
+    if stop():
         return trial
-    best = _closest(trial, stop)
-    if best is not None and best.evidence > trial.evidence:
-        return best
-    return replace(trial, candidate=replace(trial.candidate, closer=None))
+    closest = _closest(trial, stop)
+    return replace(closest, candidate=replace(closest.candidate, closer=None))
 
 
-def _closest(trial: Trial, stop: Stop) -> Trial | None:
-    """The likeliest closer description of a trial's effect; None where none makes sense."""
+def _closest(trial: Trial, stop: Stop) -> Trial:
+    """The likeliest closer description of a trial's effect; the trial where none is likelier."""
     if trial.candidate.closer is None:
-        return None
+        return trial
     closer = (
         _described(trial, candidate, values, stop)
         for candidate, values in trial.candidate.closer(trial.problem, trial.evaluation)
     )
-    sensible = [replace(t, candidate=replace(t.candidate, closer=None)) for t in closer if t and _sensible(t)]
-    return max(sensible, key=lambda t: t.evidence, default=None)
+    return max((trial, *(t for t in closer if t is not None and _sensible(t))), key=lambda t: t.evidence)
 
 
 def _sensible(trial: Trial) -> bool:
@@ -325,6 +322,11 @@ def in_stds(trial: Trial) -> dict[str, float]:
     theta, free = trial.evaluation.point.theta, trial.problem.bench.parameters.free
     std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))[: theta.size]
     return {p.name: float(z) for p, z in zip(free, (theta / std)[INERTIAL:], strict=True)}
+
+
+def ordinary_errors(problem: Problem) -> dict[str, float]:
+    """Tolerance of every number that the lab doubts itself, by name, in its own unit."""
+    return {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
 
 
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:

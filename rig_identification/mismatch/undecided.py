@@ -28,7 +28,14 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.screen import Promise
-from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, log_evidence
+from rig_identification.mismatch.trial import (
+    Trial,
+    attempt,
+    beyond_doubt,
+    finished,
+    log_evidence,
+    ordinary_errors,
+)
 
 Notify = Callable[[str, float], None]
 
@@ -93,8 +100,7 @@ def _neither_shown_nor_excluded(
 ) -> list[tuple[float, Trial]]:
     """Hypotheses that trail by little, and by how much (nats), best first."""
     nothing = log_evidence(evaluation)
-
-    ordinary = {p.name: p.prior_std for p in problem.bench.parameters.free if p.bounded}
+    ordinary = ordinary_errors(problem)
 
     def chance(candidate: Candidate) -> float:
         if candidate.everywhere:

@@ -16,7 +16,7 @@ from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, beyond_doubt, strength
+from rig_identification.mismatch.trial import Trial, beyond_doubt, ordinary_errors, strength
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -34,7 +34,7 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     curved = any(t.candidate.curved for t in found)
     fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
     # What says most comes first, whatever was found first. Without its effect an error goes to its bound
-    bounds = {p.name: ORDINARY * p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
+    bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
     found = sorted(found, key=lambda t: -strength(_at(fitted, t), bounds))
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
@@ -66,7 +66,7 @@ def _at(fitted: Fitted, trial: Trial) -> Trial:
 def pruned(best: Explained, search: Search, count: int) -> Explained:
     """The explanation less what it can do without: an early effect may only have stood in for a later one."""
     kept = list(search.found)
-    ordinary = {p.name: p.prior_std for p in search.problem.bench.parameters.free if p.bounded}
+    ordinary = ordinary_errors(search.problem)
     while len(kept) > 1:
         fitted = best.fitted
         here = [_at(fitted, t) for t in kept]
