@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import kstest
+from scipy.stats import kstest, multivariate_normal
 
-from rig_identification.estimate.constancy import departure, shared_information
+from rig_identification.estimate.constancy import departure, log_predictive, shared_information
 
 PARAMETERS, STARTS, ROWS = 6, 4, 120
 
@@ -60,3 +60,19 @@ def test_directions_that_the_held_out_run_does_not_see_tell_nothing() -> None:
     moved[0] = 30.0  # hardly shows in any row
     shared, run = linear_world(rng, moved)
     assert departure("run_2", shared, run).log10_p > -3.0
+
+
+def test_a_held_out_run_is_as_likely_as_what_the_fit_leaves_open_makes_it() -> None:
+    """Against the normal density of its readings, of which start states take their directions away."""
+    rng = np.random.default_rng(10)
+    both = []
+    for _ in range(2):
+        shared, run = linear_world(rng, np.zeros(PARAMETERS))
+        run.cost = 0.5 * float(run.residual @ run.residual)
+        columns, starts = run.jacobian[:, :PARAMETERS], run.jacobian[:, PARAMETERS:]
+        unseen = np.linalg.svd(starts)[0][:, STARTS:].T
+        spread = columns @ np.linalg.solve(shared, columns.T) + np.eye(ROWS)
+        density = multivariate_normal(cov=unseen @ spread @ unseen.T)
+        both.append((log_predictive(shared, run), density.logpdf(unseen @ run.residual)))
+    (told, exact), (other, exact_other) = both
+    assert told - other == pytest.approx(exact - exact_other, rel=1e-6)

@@ -55,6 +55,26 @@ def shared_information(information: Array, size: int) -> Array:
     return np.asarray(information[:size, :size] - cross @ np.linalg.solve(information[size:, size:], cross.T))
 
 
+def log_predictive(fitted: Array, full: Linearised) -> float:
+    """Log density (nats) of one held-out run after the fit, less what any model has of it.
+
+    Arguments as :func:`departure` has them. With the run's start integrated out, parameters N(theta, S^-1):
+        - cost + 1/2 sum [(u^T b)^2 / (1 + l) - log(1 + l)],
+    what the fit leaves open being charged and fitted alike. The difference of two models' is the log Bayes
+    factor that the run adds to what they were fitted to.
+    """
+    size = fitted.shape[0]
+    columns, starts = full.jacobian[:, :size], full.jacobian[:, size:]
+    basis = np.linalg.qr(starts)[0]
+    columns = columns - basis @ (basis.T @ columns)
+    own = basis.T @ full.residual
+    values, vectors = eigh(columns.T @ columns, fitted)
+    values = np.maximum(values, 0.0)
+    pulls = vectors.T @ (columns.T @ full.residual)
+    won = float(own @ own) + float(np.sum(pulls**2 / (1.0 + values) - np.log1p(values)))
+    return 0.5 * won - full.cost
+
+
 def departure(name: str, fitted: Array, full: Linearised) -> Departure:
     """Of one held-out run.
 

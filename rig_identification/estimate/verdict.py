@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from rig_identification.estimate.constancy import Departure, departure, shared_information
+from rig_identification.estimate.constancy import (
+    Departure,
+    departure,
+    log_predictive,
+    shared_information,
+)
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, linearise_run
@@ -147,13 +153,28 @@ def hear(fitted: Fitted) -> Heard:
     for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
         witnesses += residual_witnesses(run, linearised, linearised.residual)
     shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
-    for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
-        start = linearised.motion.state(0)
-        full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
+    for run, full in _held_out(fitted):
         if full is not None:
             witnesses += residual_witnesses(run, full, predictive_residual(shared, full))
             departures.append(departure(run.recording.name, shared, full))
     return Heard(witnesses, departures)
+
+
+def _held_out(fitted: Fitted) -> Iterator[tuple[Run, Linearised | None]]:
+    """Every held-out run about the fit, with all that is free in the model among its columns."""
+    for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
+        start = linearised.motion.state(0)
+        yield run, linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
+
+
+def held_out_densities(fitted: Fitted) -> dict[tuple[str, float], float]:
+    """Log density (nats) of every held-out run after the fit, by its recording's name and its offset (s)."""
+    shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
+    return {
+        (run.recording.name, run.offset): log_predictive(shared, full)
+        for run, full in _held_out(fitted)
+        if full is not None
+    }
 
 
 def weighed_otherwise(fitted: Fitted) -> str | None:

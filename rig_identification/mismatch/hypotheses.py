@@ -17,7 +17,7 @@ from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.sensor_errors import sensor_errors
 
-#: Hypotheses that get their first steps after each screening.
+#: Hypotheses that get their first steps after each screening; to those that are not slow, slow ones are none.
 FITTED = 4
 #: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
 #: parameters of its own as a hose or a rider has, whose fits are slow and whose place is found already.
@@ -70,6 +70,8 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
     for p in worthy:
         alike = sum(q.candidate.effect == p.candidate.effect for q in out)
         most = ALIKE if len(p.candidate.parameters) < MANY else ALIKE_IF_MANY
-        if p.gain > WORTH * worthy[0].gain and alike < most and len(out) < FITTED:
+        # A hose's nine numbers promise more of anything, and take no place from what is fitted in a second
+        others = out if p.candidate.slow else [q for q in out if not q.candidate.slow]
+        if p.gain > WORTH * worthy[0].gain and alike < most and len(others) < FITTED:
             out.append(p)
     return out

@@ -108,6 +108,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
                 positive=1,
                 name_in_result="rotor_mass",
                 settle=_less_the_rotor,
+                everywhere=True,
             )
         )
     if parameters.model.physics[block + place.GYROSCOPIC_SHARE] != 0.0:

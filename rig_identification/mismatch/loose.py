@@ -16,6 +16,7 @@ catalogue, and in runs that were held out it does so again, with the same travel
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -31,7 +32,7 @@ from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.measured import measured
-from rig_identification.mismatch.response import whitened_response
+from rig_identification.mismatch.response import instant_information, whitened_response
 from rig_identification.mismatch.rider_places import REACH, spread_of
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.screen import free_without, screen, with_reference
@@ -50,10 +51,10 @@ TRAVELS, RATES, STOPS, RATIOS = (0.002, 0.1), (0.05, 8.0), (10.0, 160.0), (0.05,
 BOUNDS = [(np.log(a), np.log(b)) for a, b in (TRAVELS, RATES, STOPS, RATIOS)] + [(-REACH, REACH)] * 3
 #: Differential evolution (Storn & Price, J. Global Optimization 11, 1997): members for each number that is
 #: looked for, generations, and how often anew. Of each scan's last members so many are heard for what they
-#: really gain; and from the best few of all, which differ by this much, steps of a simplex on that, and more
-#: of them from where the best of these comes to.
+#: really gain; and from the best few of all, which differ by this much, steps of a simplex on what they look
+#: like, and on what they gain from where the best of these comes to.
 PEOPLE, GENERATIONS, SEEDS, HEARD = 12, 60, (1, 2), 8
-STARTS, POLISHED = 3, (150, 300)
+STARTS, POLISHED = 6, (250, 250)
 ALIKE = np.array([0.25, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0])
 #: First steps of the simplex: in the logarithms, and in the place.
 NUDGES = (0.03, 0.2, 0.3, 0.3, 0.15, 0.15, 0.15)
@@ -70,67 +71,94 @@ LIKELY, FARTHEST = 0.05, 3.0
 
 @njit(cache=True, nogil=True)
 def slide(force, step, first, stop, rate, frequency, ratio, q, acceleration):  # type: ignore[no-untyped-def]
-    """Travel and acceleration (N,) of a massless part under specific force ``force`` (N,) along its line.
+    """Travel and acceleration (N, S) of S massless parts under a specific force (N, S) along their line.
 
-    first: sign of the stop that it begins at.
+    first: sign of the stop that they begin at. stop, rate, frequency, ratio: (S,) as :class:`Loose` has them.
+    Many at once take little longer than one, whose every step waits for the one before.
     """
-    omega = 2.0 * np.pi * frequency
+    nodes, count = force.shape
     h = step / FINE
-    speed, place = 0.0, first * stop
-    for k in range(force.shape[0]):
-        q[k] = place
-        total = 0.0
-        ahead = force[min(k + 1, force.shape[0] - 1)]
+    stiffness, knock = (2.0 * np.pi * frequency) ** 2, 4.0 * np.pi * frequency * ratio
+    place, speed, total = first * stop, np.zeros(count), np.empty(count)
+    for k in range(nodes):
+        ahead = min(k + 1, nodes - 1)
+        for j in range(count):
+            q[k, j] = place[j]
+            total[j] = 0.0
         for s in range(FINE):
-            pull = -(force[k] + (s + 0.5) / FINE * (ahead - force[k])) - rate * speed
-            if abs(place) > stop:
-                beyond = place - stop if place > 0.0 else place + stop
-                pull -= omega * omega * beyond + 2.0 * ratio * omega * speed
-            speed += h * pull
-            place += h * speed
-            total += pull / FINE
-        acceleration[k] = total
+            share = (s + 0.5) / FINE
+            for j in range(count):
+                p = place[j]
+                beyond = p - stop[j] if p > stop[j] else (p + stop[j] if p < -stop[j] else 0.0)
+                slowed = rate[j] + (knock[j] if beyond != 0.0 else 0.0)
+                felt = force[k, j] + share * (force[ahead, j] - force[k, j])
+                pull = -felt - slowed * speed[j] - stiffness[j] * beyond
+                speed[j] += h * pull
+                place[j] = p + h * speed[j]
+                total[j] += pull
+        for j in range(count):
+            acceleration[k, j] = total[j] / FINE
 
 
 @njit(cache=True, nogil=True)
-def _passenger(raw, axis, at, step, stop, rate, frequency, ratio):  # type: ignore[no-untyped-def]
-    """(N, 6) wrench that a kilogram loose at ``at`` exerts along the raw outputs of a motion, (N,) travel."""
-    nodes = raw.shape[0]
+def _along(raw, axis, at, step, stop, rate, frequency, ratio, q, acceleration):  # type: ignore[no-untyped-def]
+    """Travel and acceleration (N, S) of S parts at ``at`` (S, 3) along the raw outputs of a motion."""
+    nodes, count = raw.shape[0], at.shape[0]
     i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3
-    felt = np.empty(nodes)
+    felt = np.empty((nodes, count))
     for n in range(nodes):
         wi, wj, wk = raw[n, RATE + i], raw[n, RATE + j], raw[n, RATE + k]
-        along = wi * at[i] + wj * at[j] + wk * at[k]
-        turning = raw[n, ALPHA + j] * at[k] - raw[n, ALPHA + k] * at[j]
-        felt[n] = raw[n, FORCE + i] + turning + wi * along - (wi * wi + wj * wj + wk * wk) * at[i]
-    q, acceleration = np.empty(nodes), np.empty(nodes)
+        square = wi * wi + wj * wj + wk * wk
+        for m in range(count):
+            along = wi * at[m, i] + wj * at[m, j] + wk * at[m, k]
+            turning = raw[n, ALPHA + j] * at[m, k] - raw[n, ALPHA + k] * at[m, j]
+            felt[n, m] = raw[n, FORCE + i] + turning + wi * along - square * at[m, i]
     first = np.sign(raw[0, layout.OUT_GRAVITY + i])
     slide(felt, step, first, stop, rate, frequency, ratio, q, acceleration)
-    out = np.zeros((nodes, 6))
-    for n in range(nodes):
-        push = -acceleration[n]
-        out[n, i] = push
-        out[n, 3 + j] = at[k] * push + q[n] * raw[n, FORCE + k]
-        out[n, 3 + k] = -at[j] * push - q[n] * raw[n, FORCE + j]
-    return out, q
 
 
 @njit(cache=True, nogil=True)
-def _alike(wrench, wanted, weight):  # type: ignore[no-untyped-def]
-    """(w . wanted, w . w) of a wrench held between nodes, less its mean. weight (6,): of each component."""
-    nodes = wrench.shape[0]
-    with_wanted, own = 0.0, 0.0
-    for c in range(6):
-        total, square, cross, other = 0.0, 0.0, 0.0, 0.0
-        for n in range(nodes):
-            w = 0.5 * (wrench[n, c] + wrench[min(n + 1, nodes - 1), c])
-            total += w
-            square += w * w
-            cross += w * wanted[n, c]
-            other += wanted[n, c]
-        own += weight[c] * (square - total * total / nodes)
-        with_wanted += weight[c] * (cross - total * other / nodes)
-    return with_wanted, own
+def _alike(raw, axis, at, q, acceleration, pull, information):  # type: ignore[no-untyped-def]
+    """(S,) w . pull and (S,) w . information w of the wrenches of S parts, each less its mean.
+
+    pull (N, 6): what the recordings ask for, in inverse units of a wrench. information (6, 6): of one
+    interval's wrench.
+    """
+    nodes, count = q.shape
+    i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3
+    chosen = np.array([i, 3 + j, 3 + k])
+    total, shared = np.zeros((3, count)), np.zeros(count)
+    square, asked = np.zeros((6, count)), np.zeros(3)
+    for n in range(nodes):
+        fj, fk = raw[n, FORCE + j], raw[n, FORCE + k]
+        p0, p1, p2 = pull[n, chosen[0]], pull[n, chosen[1]], pull[n, chosen[2]]
+        asked[0] += p0
+        asked[1] += p1
+        asked[2] += p2
+        for m in range(count):
+            w0 = -acceleration[n, m]
+            w1 = at[m, k] * w0 + q[n, m] * fk
+            w2 = -at[m, j] * w0 - q[n, m] * fj
+            total[0, m] += w0
+            total[1, m] += w1
+            total[2, m] += w2
+            shared[m] += w0 * p0 + w1 * p1 + w2 * p2
+            square[0, m] += w0 * w0
+            square[1, m] += w1 * w1
+            square[2, m] += w2 * w2
+            square[3, m] += w0 * w1
+            square[4, m] += w0 * w2
+            square[5, m] += w1 * w2
+    own = np.zeros(count)
+    place = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+    for a in range(3):
+        for m in range(count):
+            shared[m] -= total[a, m] * asked[a] / nodes
+        for b in range(3):
+            inside = information[chosen[a], chosen[b]]
+            for m in range(count):
+                own[m] += inside * (square[place[a, b], m] - total[a, m] * total[b, m] / nodes)
+    return shared, own
 
 
 @dataclass(frozen=True)
@@ -145,26 +173,32 @@ class Loose:
     at: Array  # (3,) m, body: middle between the stops
 
     def wrench(self, motion: Motion) -> Array:
-        """(N, 6) wrench about the datum, body axes, of a kilogram of it along a motion that began at rest."""
-        return self._along(motion)[0]
+        """(N, 6) wrench about the datum, body axes, of a kilogram of it along a motion that began at rest.
+
+        Each row is the mean over the interval that it begins.
+        """
+        q, acceleration = (a[:, 0] for a in _moved([self], motion))
+        i = AXES.index(self.axis)
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out = np.zeros((q.size, 6))
+        out[:, i] = -acceleration
+        out[:, 3 + j] = -self.at[k] * acceleration + q * motion.outputs[:, FORCE + k]
+        out[:, 3 + k] = self.at[j] * acceleration - q * motion.outputs[:, FORCE + j]
+        return out
 
     def to_either_side(self, motion: Motion) -> bool:
         """Whether it leaves the one stop for the other: else nothing tells how far apart they are."""
-        q = self._along(motion)[1]
+        q = _moved([self], motion)[0]
         return bool(np.min(q) < -0.5 * self.travel and np.max(q) > 0.5 * self.travel)
 
-    def _along(self, motion: Motion) -> tuple[Array, Array]:
-        wrench, q = _passenger(
-            motion.outputs,
-            AXES.index(self.axis),
-            self.at,
-            motion.step,
-            self.travel,
-            self.rate,
-            self.stop,
-            self.ratio,
-        )
-        return np.asarray(wrench), np.asarray(q)
+
+def _moved(parts: Sequence[Loose], motion: Motion) -> tuple[Array, Array]:
+    """Travel (m) and acceleration (m/s^2), (N, S), of parts along one axis in a motion."""
+    out = np.empty((2, motion.outputs.shape[0], len(parts)))
+    at = np.array([p.at for p in parts])
+    numbers = np.array([(p.travel, p.rate, p.stop, p.ratio) for p in parts]).T
+    _along(motion.outputs, AXES.index(parts[0].axis), at, motion.step, *np.ascontiguousarray(numbers), *out)
+    return out[0], out[1]
 
 
 @dataclass(frozen=True)
@@ -188,9 +222,9 @@ class Along:
             raise ValueError("there is no random wrench that a loose part could look like")
         self.evaluation, self._mass = evaluation, mass
         self.most = FARTHEST * LIKELY * mass
-        self._weight = 1.0 / np.diag(noisy.extra_noise)
+        weight = 1.0 / np.diag(noisy.extra_noise)
         self._pairs = [
-            (run.motion, latent)
+            (run.motion, latent * weight, instant_information(run))
             for run, latent in zip(evaluation.runs, evaluation.point.latents, strict=True)
             if latent is not None
         ]
@@ -198,27 +232,28 @@ class Along:
         free = free_without(noisy, evaluation.point, evaluation, set(), 0)
         self._beyond = Beyond(evaluation, free[free >= size] if fixed else free, size)
 
-    def likeness(self, part: Loose) -> float:
-        """About how much (nats) of the random wrench a part makes needless; none of negative mass does."""
-        shared, own = 0.0, 0.0
-        for motion, latent in self._pairs:
-            both = _alike(part.wrench(motion), latent, self._weight)
+    def likeness(self, parts: Sequence[Loose]) -> Array:
+        """(S,) about how much (nats) of the random wrench parts along one axis make needless, each alone.
+
+        None does that has a negative mass, or one past which it is no part of the body.
+        """
+        shared, own = np.zeros(len(parts)), np.zeros(len(parts))
+        axis, at = AXES.index(parts[0].axis), np.array([p.at for p in parts])
+        for motion, pull, information in self._pairs:
+            both = _alike(motion.outputs, axis, at, *_moved(parts, motion), pull, information)
             shared, own = shared + both[0], own + both[1]
-        own = max(own, 1e-300)
-        mass = float(np.clip(shared / own, 0.0, self.most))
-        return mass * (shared - 0.5 * mass * own)
+        mass = shared / np.maximum(own, 1e-300)
+        return np.where((mass > 0.0) & (mass < self.most), 0.5 * mass * shared, 0.0)
 
     def gain(self, part: Loose) -> Gain:
         """What a part really takes away."""
-        rows = [
-            whitened_response(run, part.wrench(run.motion)[:, :, None], smooth=True)
-            for run in self.evaluation.runs
-        ]
+        rows = [whitened_response(run, part.wrench(run.motion)[:, :, None]) for run in self.evaluation.runs]
         found = self._beyond.of(rows)
         information = float(found.information(rows)[0, 0]) + 1.0 / (LIKELY * self._mass) ** 2
-        right = float(found.right[0])
-        mass = float(np.clip(right / information, 0.0, self.most))
-        return Gain(mass * (right - 0.5 * mass * information), mass, float(information**-0.5))
+        mass = float(found.right[0]) / information
+        if not 0.0 < mass < self.most:
+            return Gain(0.0, min(max(mass, 0.0), self.most), float(information**-0.5))
+        return Gain(0.5 * mass * float(found.right[0]), mass, float(information**-0.5))
 
 
 def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
@@ -238,11 +273,17 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
     def left(axis: str, x: Array) -> float:
         return away(x) - along.gain(part(axis, x)).nats
 
+    def unlike(axis: str, columns: Array) -> Array:
+        many = [part(axis, x) for x in columns.T]
+        return np.array([away(x) for x in columns.T]) - along.likeness(many)
+
     def scanned(where: tuple[str, int]) -> list[_Guess]:
         axis, seed = where
         found = differential_evolution(
-            lambda x: away(x) - along.likeness(part(axis, x)),
+            lambda columns: unlike(axis, columns),
             BOUNDS,
+            vectorized=True,
+            updating="deferred",
             popsize=PEOPLE,
             maxiter=GENERATIONS,
             seed=seed,
@@ -251,15 +292,14 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
         best = found.population[np.argsort(found.population_energies)[:HEARD]]
         return [_Guess(left(axis, x), axis, x) for x in best]
 
-    def polished(guess: _Guess, steps: int) -> _Guess:
+    def polished(guess: _Guess, steps: int, what: Callable[[Array], float]) -> _Guess:
         corners = guess.x + np.vstack([np.zeros(len(NUDGES)), np.diag(NUDGES)])
-        found = minimize(
-            lambda x: left(guess.axis, x),
-            guess.x,
-            method="Nelder-Mead",
-            options={"maxfev": steps, "initial_simplex": corners},
-        )
-        return _Guess(float(found.fun), guess.axis, np.asarray(found.x))
+        options = {"maxfev": steps, "initial_simplex": corners}
+        found = minimize(what, guess.x, method="Nelder-Mead", options=options)
+        return _Guess(left(guess.axis, found.x), guess.axis, np.asarray(found.x))
+
+    def alike(guess: _Guess) -> _Guess:
+        return polished(guess, POLISHED[0], lambda x: float(unlike(guess.axis, x[:, None])[0]))
 
     # What takes the time holds no lock, and no thread tells another what it found: the same every time
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -275,8 +315,8 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
         for guess in sorted(every, key=lambda g: g.left):
             if len(guesses) < STARTS and not any(guess.like(known) for known in guesses):
                 guesses.append(guess)
-        best = min(pool.map(lambda g: polished(g, POLISHED[0]), guesses), key=lambda g: g.left)
-    best = polished(best, POLISHED[1])
+        best = min((*guesses, *pool.map(alike, guesses)), key=lambda g: g.left)
+    best = polished(best, POLISHED[1], lambda x: left(best.axis, x))
     chosen = part(best.axis, best.x)
     return chosen, along.gain(chosen)
 

@@ -22,6 +22,7 @@ from rig_identification.mismatch.search import MOST_EFFECTS, Law, Trials, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided_beside
+from rig_identification.mismatch.whole_rivals import likeliest_whole
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
 
 Notify = Callable[[str, float], None]
@@ -93,6 +94,14 @@ def named(
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = whole_runs(ideal, search)
         if _wholly(best):
+            best, search = likeliest_whole(
+                ideal,
+                before,
+                tried,
+                best,
+                search,
+                lambda label, at=at: notify(f"search: whole runs with {label}", at),  # type: ignore[misc]
+            )
             kept = pruned(best, search, len(candidates))
             # What the first may have stood in for is taken out before anything is looked for beside it
             alone = kept is best and step + 1 < MOST_EFFECTS and not search.budget.spent()

@@ -71,3 +71,18 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     held = np.ascontiguousarray(wrenches)
     _innovations(A, B, run.nodes, run.row_H, run.row_D, *run.filter, held, smooth, out)
     return out
+
+
+def instant_information(run: Linearised, nodes: int = 3) -> Array:
+    """(6, 6) what a run tells of a wrench that is held over one node interval, on average over some of them.
+
+    What the run's random wrench leaves of it: at most a diagonal matrix of that one's inverse variances.
+    """
+    steps = run.motion.derivatives[0].shape[0]
+    at = np.linspace(0, steps - 1, nodes + 2).astype(int)[1:-1]
+    impulses = np.zeros((steps, 6, 6 * nodes))
+    for i, node in enumerate(at):
+        impulses[node, :, 6 * i : 6 * (i + 1)] = np.eye(6)
+    seen = whitened_response(run, impulses)
+    parts = [seen[:, 6 * i : 6 * (i + 1)] for i in range(nodes)]
+    return np.asarray(sum(part.T @ part for part in parts) / nodes)

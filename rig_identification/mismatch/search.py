@@ -154,6 +154,9 @@ def trials(
         look.begin(ringing_like(here, look.tried, seen, mass))
     if not far and not _without_support(look.tried, seen):
         look.yielding_a_little()
+    found = look.ended(limit)
+    if found.done or far or not more or not look.plainly():
+        return found
     return look.ended(limit)
 
 
@@ -222,6 +225,9 @@ class _Look:
         worthy = worth_a_fit(self.promises, self.count)
         if not self.far and shows(self.seen):
             worthy = [p for p in worthy if p.share > WORTH]
+        if self.fitted is not None and all(p.candidate.label != self.fitted.candidate.label for p in worthy):
+            # More than first order promised may have come of it
+            worthy += [p for p in self.promises if p.candidate.label == self.fitted.candidate.label]
         self.begin(worthy)
 
     def outright(self) -> None:
@@ -333,6 +339,17 @@ class _Look:
         worthy = self.untried(supports(self.here, self.seen, self.mass))
         self.begin(worth_a_fit(sorted(worthy, key=lambda p: -p.gain), self.count))
 
+    def plainly(self) -> bool:
+        """Whether there is a number of the rig left to try, where nothing that was tried makes sense.
+
+        Of two effects at once a third one of many numbers may promise more than either, keep it, and have an
+        amount that may as well be none.
+        """
+        rest = [p for p in self.untried(self.promises) if not p.candidate.slow]
+        self.tried = []
+        self.begin(worth_a_fit(rest, self.count))
+        return bool(self.tried)
+
     def _lawfully(self) -> bool:
         """Whether a law explains it all."""
         if self.law is not None:
@@ -372,7 +389,9 @@ class _Look:
             if len(done) == FINISHED or ((last or (done and self.budget.spent())) and not trial.settled):
                 continue
             self.notify(trial.candidate.label)
-            ended = finished(trial, self.budget)
+            # What is beaten is stated as it is: a closer description of it takes half a minute
+            plain = replace(trial, candidate=replace(trial.candidate, closer=None)) if last else trial
+            ended = finished(plain, self.budget)
             if ended is None or not beyond_doubt(ended, ordinary, limit):
                 continue
             if not self.far and not amount_seen(ended) and not self._missed(ended):

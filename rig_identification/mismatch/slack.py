@@ -18,6 +18,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.rest_evidence import RestEvidence
 from rig_identification.estimate.rods import FEW, pushes, reads_nothing
+from rig_identification.estimate.solve import excess
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.result import Finding, Mismatch
@@ -210,7 +211,10 @@ def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | Non
 def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
     """What was found between the spells, and the spells."""
     before, after = ideal.scores.holdout, judged(found.fitted)[0].holdout
-    slack = replace(slack_finding(spells), evidence=evidence_of(ideal, found.fitted, after))
+    loose, taut, modelled = (excess(f.evaluation) for f in (ideal.fitted, found.ideal.fitted, found.fitted))
+    # What is left out of the fit is compared by what it left: of other samples there is no likelihood
+    evidence = {**evidence_of(ideal, found.fitted, after), "log_likelihood_gain": loose - taut}
+    slack = replace(slack_finding(spells), evidence=evidence)
     mismatch = found.mismatch
     if mismatch.verdict == "none":
         text = f"Where every cable pulls every residual is noise. {held_out_errors(before, after)}"
@@ -222,7 +226,7 @@ def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained
         fitted = found.ideal.fitted
         mismatch = Mismatch("explained", text, (), mismatch.alternatives)
         found = replace(found, fitted=fitted, loose=max(found.loose, hear(fitted).looseness))
-    # What is left out of the fit bends nothing: what is in its model says more
-    named = mismatch.verdict == "explained"
-    findings = (*mismatch.findings, slack) if named else (slack, *mismatch.findings)
+    # What takes most of what was left away comes first, be it into the model or out of the fit
+    last = mismatch.verdict == "explained" and taut - modelled > loose - taut
+    findings = (*mismatch.findings, slack) if last else (slack, *mismatch.findings)
     return replace(found, mismatch=replace(mismatch, findings=findings))

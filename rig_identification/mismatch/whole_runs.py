@@ -35,7 +35,7 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
     # What says most comes first, whatever was found first. Without its effect an error goes to its bound
     bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
-    found = sorted(found, key=lambda t: -strength(_at(fitted, t), bounds))
+    found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
     # a held-out run that cannot be followed, of which there is no residual to hear
@@ -58,7 +58,7 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     )
 
 
-def _at(fitted: Fitted, trial: Trial) -> Trial:
+def as_fitted(fitted: Fitted, trial: Trial) -> Trial:
     """A trial whose effect is in a fit's model, as that fit has it."""
     return replace(trial, problem=fitted.problem, evaluation=fitted.evaluation)
 
@@ -69,7 +69,7 @@ def pruned(best: Explained, search: Search, count: int) -> Explained:
     ordinary = ordinary_errors(search.problem)
     while len(kept) > 1:
         fitted = best.fitted
-        here = [_at(fitted, t) for t in kept]
+        here = [as_fitted(fitted, t) for t in kept]
         strengths = [
             strength(t) / needed_gain(t.candidate, count) if beyond_doubt(t, ordinary, ORDINARY) else 0.0
             for t in here

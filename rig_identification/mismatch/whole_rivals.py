@@ -1,0 +1,93 @@
+"""Hypotheses that hardly trail the likeliest one, told apart by whole runs and by runs that were held out.
+
+Short pieces each have a start of their own: what adds up over half a minute, how a swing dies away or falls
+out of step, is lost to them, and an effect of many numbers bends to what is left as well as the right one
+does. Nor do fitted runs tell what was bent to them. So where the likeliest hypothesis explains all, those
+that trail it by little and have no more numbers of their own are fitted to whole runs as well, and the
+evidence of these decides together with what the held-out runs add to it (constancy.log_predictive).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit
+from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.observability import inertial_estimate
+from rig_identification.mismatch.explained import Explained, held_out_gain
+from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.first_fits import BEATEN, at_noise
+from rig_identification.mismatch.in_motion import unearned
+from rig_identification.mismatch.search import Trials
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial, log_evidence
+from rig_identification.mismatch.whole_runs import as_fitted, whole_runs
+
+#: Effects that the noise of the exciter's force tells apart, and not the motion: see late.py.
+ALIKE = {"clock_offset", "sensor_lag"}
+
+
+def likeliest_whole(
+    ideal: Ideal,
+    before: Search,
+    tried: Trials,
+    best: Explained,
+    search: Search,
+    notify: Callable[[str], None],
+) -> tuple[Explained, Search]:
+    """What all runs say most for, and how it was found.
+
+    best: whole runs with the first of what was ``tried``, which leave only noise; search: how it was found;
+    before: where the search stood before any of them was adopted.
+    """
+    first = tried.done[0]
+    heard: list[tuple[Trial, Explained, Search]] = [(first, best, search)]
+    for trial in _close(first, (*tried.done[1:], *tried.beaten)):
+        if search.budget.spent():
+            break
+        its = replace(before, found=list(before.found), rivals=list(before.rivals))
+        its.adopt(tried, trial)
+        notify(", ".join(t.candidate.label for t in its.found))
+        heard.append((trial, whole_runs(ideal, its), its))
+    if len(heard) == 1:
+        return best, search
+    said = {
+        id(trial): (trial.evidence if before.whole else _evidence(ideal, found))
+        + held_out_gain(ideal.fitted, found.fitted)
+        for trial, found, _ in heard
+    }
+    convincing = [h for h in heard if h[1].mismatch.verdict == "explained" and not h[1].trace]
+    chosen, best, search = max(convincing, key=lambda h: said[id(h[0])])
+    gaps = [
+        (max(0.0, said[id(chosen)] - said[id(t)]), as_fitted(found.fitted, t))
+        for t, found, _ in heard
+        if t is not chosen
+    ]
+    others = [(first.evidence - t.evidence, t) for t in tried.done if id(t) not in said]
+    stated = sorted([*gaps, *others], key=lambda gap: gap[0])
+    search.rivals = [*before.rivals, *(rival(t, gap) for gap, t in stated)]
+    seen = stated if before.whole else gaps
+    search.bodies = tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in seen)
+    told = replace(best.mismatch, alternatives=tuple(search.rivals))
+    return replace(best, mismatch=told, bodies=search.bodies), search
+
+
+def _close(first: Trial, others: tuple[Trial, ...]) -> list[Trial]:
+    """Those of ``others`` that trail the first by little and have no more numbers to bend, in their order."""
+    plain = len(first.candidate.parameters)
+    return [
+        t
+        for t in others
+        if first.evidence - t.evidence < BEATEN
+        and len(t.candidate.parameters) <= plain
+        and {first.candidate.effect, t.candidate.effect} != ALIKE
+        and at_noise(t)
+    ]
+
+
+def _evidence(ideal: Ideal, found: Explained) -> float:
+    """Log evidence of whole runs; near the noise, less what is gained from the noise alone."""
+    before, after = ideal.fitted.evaluation, found.fitted.evaluation
+    near = misfit(before) <= NEAR_SQUARE
+    return log_evidence(after) - (unearned(ideal.fitted.problem, before, after.runs) if near else 0.0)
