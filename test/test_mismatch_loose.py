@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 from test_model_derivatives import drive_of
 from test_model_rigs import thesis_case_14
 from test_simulate_identify import shaken
@@ -125,13 +126,14 @@ def along_measured(effects: dict[str, tuple[float, ...]]) -> Along:
 def test_what_a_part_looks_like_is_what_it_takes_away() -> None:
     """The scan asks a thousand times as often as it can afford the answer itself."""
     along = along_measured(TRUTH)
-    parts = [Loose("y", 0.02, rate, stop, 0.4, AT) for rate in (0.3, 0.8, 2.0) for stop in (15.0, 40.0, 80.0)]
+    parts = [Loose("y", 0.02, rate, stop, 0.4, AT) for rate in (0.4, 0.5, 0.6) for stop in (15.0, 20.0, 25.0)]
     gains = np.array([along.gain(part).nats for part in parts])
-    alike = np.array([along.likeness(part) for part in parts])
-    strong = gains > 0.3 * gains.max()
-    assert np.count_nonzero(strong) > 1
-    assert np.all(alike[strong] > 0.5 * gains[strong])
-    assert np.all(alike < 2.0 * gains.max())
+    alike = along.likeness(parts)
+    assert gains.max() > 10.0
+    assert spearmanr(alike, gains).statistic > 0.95
+    # What is free beside it takes a part of what it looks like
+    likely = alike.argmax()
+    assert gains[likely] < alike[likely] < 3.0 * gains[likely]
 
 
 def test_a_loose_part_that_has_to_weigh_too_much_is_none() -> None:

@@ -17,6 +17,8 @@ from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.sensor_errors import sensor_errors
 
+#: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
+EVERYWHERE = 3
 #: Hypotheses that get their first steps after each screening; to those that are not slow, slow ones are none.
 FITTED = 4
 #: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
@@ -55,10 +57,11 @@ def needed_gain(candidate: Candidate, count: int) -> float:
     """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks).
 
     Bonferroni's correction, weighted (Genovese, Roeder and Wasserman, Biometrika 93, 2006): what the lab
-    doubts itself is likelier wrong than what it leaves out.
+    doubts itself is likelier wrong than what it leaves out. What every rig has some of is a family of its
+    own: no chance among many, of that only the amount is asked.
     """
-    weight = DOUBTED if candidate.doubted else 1.0
-    return 0.5 * float(chi2.isf(weight * FALSE_ALARM / count, len(candidate.parameters)))
+    share = 1.0 / EVERYWHERE if candidate.everywhere else (DOUBTED if candidate.doubted else 1.0) / count
+    return 0.5 * float(chi2.isf(FALSE_ALARM * share, len(candidate.parameters)))
 
 
 def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:

@@ -1,0 +1,85 @@
+"""What short pieces or chance put first is put right by whole and held-out runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.estimate.solve import excess
+from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.mismatch.explained import held_out_gain
+from rig_identification.mismatch.hypotheses import FITTED, catalogue, count_of, needed_gain, worth_a_fit
+from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.search import Trials
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial, attempt, finished, mass_of
+from rig_identification.mismatch.whole_rivals import likeliest_whole
+from rig_identification.mismatch.whole_runs import whole_runs
+from rig_identification.simulate import simulate_session
+
+#: N m s/rad in every hinge; nats by which the wrong one is put ahead.
+DAMPING, AHEAD = 1.0, 2.0
+
+
+@pytest.fixture(scope="module")
+def ideal() -> Ideal:
+    spec = shaken(10, 10.0)
+    again = replace(spec.runs[0], name="run_2", holdout=True)
+    spec = replace(spec, runs=(*spec.runs, again), effects={"hinge_damping": (DAMPING,)}, doubts=False)
+    fitted = fit_session(simulate_session(spec, np.random.default_rng(5))[0])
+    return Ideal(fitted, *judged(fitted))
+
+
+@pytest.fixture(scope="module")
+def search(ideal: Ideal) -> Search:
+    problem = with_reference(ideal.fitted.problem, ideal.fitted.rest)
+    evaluation = ideal.fitted.evaluation
+    return Search(problem, problem, evaluation, excess(evaluation), UNLIMITED)
+
+
+def fit_of(search: Search, label: str) -> Trial:
+    problem, evaluation = search.problem, search.evaluation
+    promises = screen(problem, evaluation, catalogue(problem), mass_of(problem, evaluation))
+    begun = attempt(problem, evaluation, next(p for p in promises if p.candidate.label == label))
+    ended = None if begun is None else finished(begun)
+    assert ended is not None
+    return ended
+
+
+def test_held_out_runs_put_damping_before_the_friction_that_chance_put_first(
+    ideal: Ideal, search: Search
+) -> None:
+    damping, friction = fit_of(search, "hinge_damping"), fit_of(search, "hinge_friction")
+    friction = replace(friction, evidence=damping.evidence + AHEAD)
+    tried = Trials([friction, damping])
+    first = replace(search, found=[], rivals=[])
+    first.adopt(tried, friction)
+    wrong = whole_runs(ideal, first)
+    assert [f.effect for f in wrong.mismatch.findings] == ["hinge_friction"]
+    best, how = likeliest_whole(ideal, search, tried, wrong, first, lambda label: None)
+    assert [f.effect for f in best.mismatch.findings] == ["hinge_damping"]
+    assert [t.candidate.effect for t in how.found] == ["hinge_damping"]
+    assert held_out_gain(wrong.fitted, best.fitted) > AHEAD
+    (other,) = best.mismatch.alternatives
+    assert other["effect"] == "hinge_friction"
+    gap = held_out_gain(wrong.fitted, best.fitted) - AHEAD
+    assert float(str(other["log_likelihood_gap"])) == pytest.approx(gap, rel=1e-6)
+    assert len(best.bodies) == 1
+    assert not search.found
+
+
+def test_slow_hypotheses_take_no_place_from_quick_ones(search: Search) -> None:
+    candidates = catalogue(search.problem)
+    count = count_of(candidates)
+    slow = [c for c in candidates if c.slow][: 2 * FITTED]
+    quick = [c for c in candidates if not c.slow and c.doubted][:1]
+    enough = max(needed_gain(c, count) for c in candidates)
+    promises = [Promise(c, (3.0 - 0.01 * i) * enough, {}) for i, c in enumerate(slow)]
+    promises += [Promise(c, 2.0 * enough, {}) for c in quick]
+    chosen = [p.candidate.label for p in worth_a_fit(promises, count)]
+    assert quick[0].label in chosen
+    assert sum(label in chosen for label in (c.label for c in slow)) <= FITTED
