@@ -18,7 +18,7 @@ from rig_identification.result import Identification
 from rig_identification.simulate import simulate_session
 
 #: kg of entrained air that gains less than chance may, and more than its prior is charged.
-AIR = 13.0
+AIR = 11.0
 
 
 def answer(effects: dict[str, tuple[float, ...]], seed: int) -> tuple[Identification, np.ndarray]:
