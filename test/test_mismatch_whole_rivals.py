@@ -10,8 +10,8 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import Ideal, fit_session, judged
 from rig_identification.estimate.solve import excess
+from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.budget import UNLIMITED
-from rig_identification.mismatch.explained import held_out_gain
 from rig_identification.mismatch.hypotheses import FITTED, catalogue, count_of, needed_gain, worth_a_fit
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.search import Trials
@@ -63,11 +63,12 @@ def test_held_out_runs_put_damping_before_the_friction_that_chance_put_first(
     best, how = likeliest_whole(ideal, search, tried, wrong, first, lambda label: None)
     assert [f.effect for f in best.mismatch.findings] == ["hinge_damping"]
     assert [t.candidate.effect for t in how.found] == ["hinge_damping"]
-    assert held_out_gain(wrong.fitted, best.fitted) > AHEAD
+    after, before = held_out_densities(best.fitted), held_out_densities(wrong.fitted)
+    gain = after["run_2", 0.0] - before["run_2", 0.0]
+    assert gain > AHEAD
     (other,) = best.mismatch.alternatives
     assert other["effect"] == "hinge_friction"
-    gap = held_out_gain(wrong.fitted, best.fitted) - AHEAD
-    assert float(str(other["log_likelihood_gap"])) == pytest.approx(gap, rel=1e-6)
+    assert float(str(other["log_likelihood_gap"])) == pytest.approx(gain - AHEAD, rel=1e-6)
     assert len(best.bodies) == 1
     assert not search.found
 

@@ -154,27 +154,24 @@ def hear(fitted: Fitted) -> Heard:
         witnesses += residual_witnesses(run, linearised, linearised.residual)
     shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
     for run, full in _held_out(fitted):
-        if full is not None:
-            witnesses += residual_witnesses(run, full, predictive_residual(shared, full))
-            departures.append(departure(run.recording.name, shared, full))
+        witnesses += residual_witnesses(run, full, predictive_residual(shared, full))
+        departures.append(departure(run.recording.name, shared, full))
     return Heard(witnesses, departures)
 
 
-def _held_out(fitted: Fitted) -> Iterator[tuple[Run, Linearised | None]]:
+def _held_out(fitted: Fitted) -> Iterator[tuple[Run, Linearised]]:
     """Every held-out run about the fit, with all that is free in the model among its columns."""
     for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
         start = linearised.motion.state(0)
-        yield run, linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
+        full = linearise_run(fitted.problem.bench, run, fitted.evaluation.point.theta, start)
+        if full is not None:
+            yield run, full
 
 
 def held_out_densities(fitted: Fitted) -> dict[tuple[str, float], float]:
     """Log density (nats) of every held-out run after the fit, by its recording's name and its offset (s)."""
     shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
-    return {
-        (run.recording.name, run.offset): log_predictive(shared, full)
-        for run, full in _held_out(fitted)
-        if full is not None
-    }
+    return {(run.recording.name, run.offset): log_predictive(shared, full) for run, full in _held_out(fitted)}
 
 
 def weighed_otherwise(fitted: Fitted) -> str | None:

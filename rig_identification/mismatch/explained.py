@@ -9,7 +9,6 @@ from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.solve import excess
-from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.result import Mismatch
 
 #: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
@@ -40,15 +39,6 @@ def only_a_trace(ideal: Fitted, fitted: Fitted, square: float = TRACE_SQUARE) ->
     share = excess(fitted.evaluation) / max(excess(ideal.evaluation), 1.0)
     allowed = max(square, NEXT_TO_NONE_SQUARE) if share < NEXT_TO_NONE else square
     return fitted.converged and share < TRACE and misfit(fitted.evaluation) < allowed
-
-
-def held_out_gain(ideal: Fitted, fitted: Fitted) -> float:
-    """Nats that the held-out runs that both follow say for ``fitted`` against ``ideal``: a log Bayes factor.
-
-    None of them is fitted; what either fit leaves open of its parameters is averaged over (constancy.py).
-    """
-    before, after = held_out_densities(ideal), held_out_densities(fitted)
-    return sum(after[key] - before[key] for key in before.keys() & after.keys())
 
 
 def held_out_errors(before: float | None, after: float | None) -> str:

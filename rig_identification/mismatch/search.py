@@ -155,7 +155,7 @@ def trials(
     if not far and not _without_support(look.tried, seen):
         look.yielding_a_little()
     found = look.ended(limit)
-    if found.done or far or not more or not look.plainly():
+    if found.done or far or not more or not look.passed_over():
         return found
     return look.ended(limit)
 
@@ -339,7 +339,7 @@ class _Look:
         worthy = self.untried(supports(self.here, self.seen, self.mass))
         self.begin(worth_a_fit(sorted(worthy, key=lambda p: -p.gain), self.count))
 
-    def plainly(self) -> bool:
+    def passed_over(self) -> bool:
         """Whether there is a number of the rig left to try, where nothing that was tried makes sense.
 
         Of two effects at once a third one of many numbers may promise more than either, keep it, and have an

@@ -15,7 +15,8 @@ from dataclasses import replace
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.observability import inertial_estimate
-from rig_identification.mismatch.explained import Explained, held_out_gain
+from rig_identification.estimate.verdict import held_out_densities
+from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import BEATEN, at_noise
 from rig_identification.mismatch.in_motion import unearned
@@ -52,10 +53,13 @@ def likeliest_whole(
         heard.append((trial, whole_runs(ideal, its), its))
     if len(heard) == 1:
         return best, search
+    held = [held_out_densities(found.fitted) for _, found, _ in heard]
+    # A run that one of them cannot follow tells nothing of the others
+    followed = set.intersection(*(set(densities) for densities in held))
     said = {
         id(trial): (trial.evidence if before.whole else _evidence(ideal, found))
-        + held_out_gain(ideal.fitted, found.fitted)
-        for trial, found, _ in heard
+        + sum(densities[key] for key in followed)
+        for (trial, found, _), densities in zip(heard, held, strict=True)
     }
     convincing = [h for h in heard if h[1].mismatch.verdict == "explained" and not h[1].trace]
     chosen, best, search = max(convincing, key=lambda h: said[id(h[0])])
