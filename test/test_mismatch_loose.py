@@ -136,6 +136,14 @@ def test_what_a_part_looks_like_is_what_it_takes_away() -> None:
     assert gains[likely] < alike[likely] < 3.0 * gains[likely]
 
 
+def test_what_gravity_holds_on_its_stop_is_not_loose() -> None:
+    """Along z it leaves it where the body falls faster than it does; along y a sloping floor holds it."""
+    along = along_measured({})
+    motion = along.evaluation.runs[0].motion
+    assert not Loose("z", 0.002, 0.5, 50.0, 0.05, AT).leaves_its_stop(motion)
+    assert Loose("y", 0.002, 0.5, 50.0, 0.05, AT).leaves_its_stop(motion)
+
+
 def test_a_loose_part_that_has_to_weigh_too_much_is_none() -> None:
     """A way of two millimetres looks like a hundred kilograms, and a part that light like nothing."""
     along = along_measured({"hinge_damping": (25.0,)})

@@ -16,8 +16,8 @@ from rig_identification.mismatch.hypotheses import FITTED, catalogue, count_of, 
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.search import Trials
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, attempt, finished, mass_of
-from rig_identification.mismatch.whole_rivals import likeliest_whole
+from rig_identification.mismatch.trial import Trial, among_places, attempt, finished, mass_of
+from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
 from rig_identification.mismatch.whole_runs import whole_runs
 from rig_identification.simulate import simulate_session
 
@@ -71,6 +71,31 @@ def test_held_out_runs_put_damping_before_the_friction_that_chance_put_first(
     assert float(str(other["log_likelihood_gap"])) == pytest.approx(gain - AHEAD, rel=1e-6)
     assert len(best.bodies) == 1
     assert not search.found
+
+
+def test_an_effect_is_as_likely_as_another_wherever_it_is(search: Search) -> None:
+    candidates = catalogue(search.problem)
+    hinge = next(c for c in candidates if c.effect == "hinge_position")
+    level = next(c for c in candidates if c.effect == "level_error")
+    assert (hinge.places, level.places) == (sum(c.effect == "hinge_position" for c in candidates), 2)
+    at_hinge = among_places(Trial(hinge, search.problem, search.evaluation, 10.0))
+    of_level = among_places(Trial(level, search.problem, search.evaluation, 10.0))
+    assert of_level.evidence - at_hinge.evidence == pytest.approx(np.log(hinge.places / 2.0))
+
+
+def test_what_leaves_a_trace_is_kept_where_what_leaves_none_is_far_less_likely(
+    ideal: Ideal, search: Search
+) -> None:
+    """Air is no rival of damping, and damping is one of it."""
+    found = []
+    for label in ("hinge_damping", "air_drag"):
+        trial = fit_of(search, label)
+        own = replace(search, found=[], rivals=[])
+        own.adopt(Trials([trial]), trial)
+        found.append((trial, whole_runs(ideal, own)))
+    (damping, with_damping), (drag, with_drag) = found
+    assert outdone(ideal, damping, with_damping, drag, with_drag)
+    assert not outdone(ideal, drag, with_drag, damping, with_damping)
 
 
 def test_slow_hypotheses_take_no_place_from_quick_ones(search: Search) -> None:

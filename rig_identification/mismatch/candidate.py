@@ -39,6 +39,7 @@ class Candidate:
     closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
     curved: bool = False  # its amounts bend the valleys of a fit: a force by a power of the motion
     everywhere: bool = False  # every rig has some of it: only how much is a question
+    places: int = 1  # at which the effect is asked for, this one among them
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -32,11 +35,14 @@ def catalogue(problem: Problem) -> list[Candidate]:
     mass = float(
         parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))[0]
     )
-    return [
+    every = [
         *sensor_errors(rig, parameters, devices_of(problem)),
         *rig_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]
+    # What is slow has several descriptions and one place
+    places = Counter(c.effect for c in every if not c.slow)
+    return [c if c.slow else replace(c, places=places[c.effect]) for c in every]
 
 
 def compatible(candidates: list[Candidate], found: list[Candidate]) -> list[Candidate]:

@@ -65,6 +65,8 @@ TIMED, WEIGHED = 0.5, 1.0
 AHEAD, CONFIRMED = 30.0, 10.0
 #: Share of that below which the scan's best is not followed any further.
 FAINT = 0.25
+#: Share of its travel to which a part has come that left its stop.
+LEFT = 0.99
 #: Prior std of its mass, in parts of the body's, and the number of them past which it is no part of the body.
 LIKELY, FARTHEST = 0.05, 3.0
 
@@ -185,6 +187,10 @@ class Loose:
         out[:, 3 + j] = -self.at[k] * acceleration + q * motion.outputs[:, FORCE + k]
         out[:, 3 + k] = self.at[j] * acceleration - q * motion.outputs[:, FORCE + j]
         return out
+
+    def leaves_its_stop(self, motion: Motion) -> bool:
+        """Whether it ever does: what gravity holds down for good knocks at nothing; it rings on its stop."""
+        return bool(np.min(np.abs(_moved([self], motion)[0])) < LEFT * self.travel)
 
     def to_either_side(self, motion: Motion) -> bool:
         """Whether it leaves the one stop for the other: else nothing tells how far apart they are."""
@@ -347,6 +353,7 @@ def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:
     along = Along(*seen, mass)
     part, gain = likeliest(along, middle_of(problem.bench.rig), spread_of(problem))
     likely = gain.nats > AHEAD and gain.mass < along.most
+    likely = likely and any(part.leaves_its_stop(run.motion) for run in seen[1].runs)
     held = _held_out(fitted, problem, mass) if likely else None
     again = None if held is None else held.gain(part)
     if again is None or again.nats < CONFIRMED:

@@ -22,7 +22,7 @@ from rig_identification.mismatch.search import MOST_EFFECTS, Law, Trials, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided_beside
-from rig_identification.mismatch.whole_rivals import likeliest_whole
+from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
 
 Notify = Callable[[str, float], None]
@@ -123,7 +123,11 @@ def named(
         if near_noise(best.fitted):
             others = list(_second_choices(ideal, before, tried, notify))
             if others and _wholly(others[-1][0]):
-                return pruned(*others[-1], len(candidates))
+                found, its = others[-1]
+                traced = best.mismatch.verdict == "explained"
+                if not traced or not outdone(ideal, first, best, its.found[-1], found):
+                    return pruned(found, its, len(candidates))
+                others = []
             standing = [(best, search), *others]
             for found, its in standing:
                 its.here, its.evaluation = found.fitted.problem, found.fitted.evaluation

@@ -42,6 +42,7 @@ from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
     FIRST_STEPS,
     Trial,
+    among_places,
     amount_seen,
     attempt,
     beyond_doubt,
@@ -306,7 +307,7 @@ class _Look:
             twin = None if begun is None else finished(begun, self.budget)
             if twin is not None and twin.evidence > self.needed:
                 out.append(twin)
-        return told_apart(sorted(out, key=lambda t: -t.evidence), MEANT)
+        return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
 
     def without_devices(self) -> None:
         """What is wrong with the device that contradicts all others, if one does."""
@@ -402,7 +403,7 @@ class _Look:
                 _place(ended, beaten if last else done)
         told = self.told(done)
         chief = bool(told) and excess(told[0].evaluation) < CHIEF * excess(self.seen)
-        return Trials(told, self.device, tuple(beaten), chief=chief)
+        return Trials(told, self.device, tuple(map(among_places, beaten)), chief=chief)
 
 
 def _place(trial: Trial, among: list[Trial]) -> None:

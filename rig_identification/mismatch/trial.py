@@ -303,6 +303,15 @@ def _described(trial: Trial, candidate: Candidate, values: dict[str, float], sto
     return Trial(candidate, wide, fitted, log_evidence(fitted), True)
 
 
+def among_places(trial: Trial) -> Trial:
+    """The trial as likely as its effect is at that place, of all places at which it could be.
+
+    Beforehand every effect is as likely as another one, wherever it is: one upper hinge of three that is off
+    along z is alike to a ceiling that is off level, and is one of eighteen where that is one of two.
+    """
+    return replace(trial, evidence=trial.evidence - float(np.log(trial.candidate.places)))
+
+
 def signs(trial: Trial) -> list[float]:
     """What cannot be negative, in units of its own std."""
     positive = trial.candidate.parameters[: trial.candidate.positive]

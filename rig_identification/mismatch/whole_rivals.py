@@ -19,10 +19,11 @@ from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import BEATEN, at_noise
-from rig_identification.mismatch.in_motion import unearned
-from rig_identification.mismatch.search import Trials
+from rig_identification.mismatch.in_motion import cost_in_motion, unearned
+from rig_identification.mismatch.late import SETTLING
+from rig_identification.mismatch.search import MEANT, Trials
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, log_evidence
+from rig_identification.mismatch.trial import Trial, among_places, log_evidence
 from rig_identification.mismatch.whole_runs import as_fitted, whole_runs
 
 #: Effects that the noise of the exciter's force tells apart, and not the motion: see late.py.
@@ -57,7 +58,7 @@ def likeliest_whole(
     # A run that one of them cannot follow tells nothing of the others
     followed = set.intersection(*(set(densities) for densities in held))
     said = {
-        id(trial): (trial.evidence if before.whole else _evidence(ideal, found))
+        id(trial): (trial.evidence if before.whole else _evidence(ideal, trial, found))
         + sum(densities[key] for key in followed)
         for (trial, found, _), densities in zip(heard, held, strict=True)
     }
@@ -90,8 +91,23 @@ def _close(first: Trial, others: tuple[Trial, ...]) -> list[Trial]:
     ]
 
 
-def _evidence(ideal: Ideal, found: Explained) -> float:
-    """Log evidence of whole runs; near the noise, less what is gained from the noise alone."""
+def outdone(ideal: Ideal, first: Trial, traced: Explained, other: Trial, wholly: Explained) -> bool:
+    """Whether what explains all but a trace is so much likelier that what explains all is none of it.
+
+    traced, wholly: whole runs with ``first`` and with ``other``. A doubt that lies a little beyond its
+    tolerances is such a trace, and its evidence is charged for it already.
+    """
+    if {first.candidate.effect, other.candidate.effect} == ALIKE:
+        costs = [cost_in_motion(e.fitted.problem, e.fitted.evaluation, SETTLING) for e in (wholly, traced)]
+        return costs[0] - costs[1] > MEANT
+    held = [held_out_densities(e.fitted) for e in (traced, wholly)]
+    heard = sum(held[0][key] - held[1][key] for key in held[0].keys() & held[1].keys())
+    return _evidence(ideal, first, traced) - _evidence(ideal, other, wholly) + heard > BEATEN
+
+
+def _evidence(ideal: Ideal, trial: Trial, found: Explained) -> float:
+    """Log evidence of whole runs with an effect; near the noise, less what is gained from that alone."""
     before, after = ideal.fitted.evaluation, found.fitted.evaluation
     near = misfit(before) <= NEAR_SQUARE
-    return log_evidence(after) - (unearned(ideal.fitted.problem, before, after.runs) if near else 0.0)
+    less = unearned(ideal.fitted.problem, before, after.runs) if near else 0.0
+    return among_places(replace(trial, evidence=log_evidence(after) - less)).evidence
