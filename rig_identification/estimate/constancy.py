@@ -55,6 +55,16 @@ def shared_information(information: Array, size: int) -> Array:
     return np.asarray(information[:size, :size] - cross @ np.linalg.solve(information[size:, size:], cross.T))
 
 
+def _directions(fitted: Array, full: Linearised) -> tuple[Array, Array, Array]:
+    """Of each generalised eigenvector u its l and u^T b, (p,) each, and the residual in the run's starts."""
+    size = fitted.shape[0]
+    columns, starts = full.jacobian[:, :size], full.jacobian[:, size:]
+    basis = np.linalg.qr(starts)[0]
+    columns = columns - basis @ (basis.T @ columns)
+    values, vectors = eigh(columns.T @ columns, fitted)
+    return values, vectors.T @ (columns.T @ full.residual), basis.T @ full.residual
+
+
 def log_predictive(fitted: Array, full: Linearised) -> float:
     """Log density (nats) of one held-out run after the fit, less what any model has of it.
 
@@ -63,14 +73,8 @@ def log_predictive(fitted: Array, full: Linearised) -> float:
     what the fit leaves open being charged and fitted alike. The difference of two models' is the log Bayes
     factor that the run adds to what they were fitted to.
     """
-    size = fitted.shape[0]
-    columns, starts = full.jacobian[:, :size], full.jacobian[:, size:]
-    basis = np.linalg.qr(starts)[0]
-    columns = columns - basis @ (basis.T @ columns)
-    own = basis.T @ full.residual
-    values, vectors = eigh(columns.T @ columns, fitted)
+    values, pulls, own = _directions(fitted, full)
     values = np.maximum(values, 0.0)
-    pulls = vectors.T @ (columns.T @ full.residual)
     won = float(own @ own) + float(np.sum(pulls**2 / (1.0 + values) - np.log1p(values)))
     return 0.5 * won - full.cost
 
@@ -80,12 +84,7 @@ def departure(name: str, fitted: Array, full: Linearised) -> Departure:
 
     fitted (p, p): the fit's :func:`shared_information`. full: the run linearised about the fit.
     """
-    size = fitted.shape[0]
-    columns, starts = full.jacobian[:, :size], full.jacobian[:, size:]
-    basis = np.linalg.qr(starts)[0]
-    columns = columns - basis @ (basis.T @ columns)
-    values, vectors = eigh(columns.T @ columns, fitted)
-    pulls = vectors.T @ (columns.T @ full.residual)
+    values, pulls, _ = _directions(fitted, full)
     compared = values > COMPARED
     spread = values[compared] + values[compared] ** 2
     return Departure(name, float(np.sum(pulls[compared] ** 2 / spread)), int(np.count_nonzero(compared)))

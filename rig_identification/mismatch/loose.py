@@ -352,8 +352,7 @@ def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:
         return None
     along = Along(*seen, mass)
     part, gain = likeliest(along, middle_of(problem.bench.rig), spread_of(problem))
-    likely = gain.nats > AHEAD and gain.mass < along.most
-    likely = likely and any(part.leaves_its_stop(run.motion) for run in seen[1].runs)
+    likely = gain.nats > AHEAD and any(part.leaves_its_stop(run.motion) for run in seen[1].runs)
     held = _held_out(fitted, problem, mass) if likely else None
     again = None if held is None else held.gain(part)
     if again is None or again.nats < CONFIRMED:

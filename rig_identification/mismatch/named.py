@@ -66,7 +66,7 @@ def named(
         search.liar = search.liar or tried.liar
         if not tried.done:
             break
-        before = replace(search, found=list(search.found), rivals=list(search.rivals))
+        before = search.forked()
         first = tried.done[0]
         if not search.whole and not tried.chief:
             # What takes a smaller part away stands in for something: a fit to all pieces says no more of it
@@ -171,9 +171,7 @@ def _one_more(
     left = compatible(candidates, [t.candidate for t in search.found])
     promises = screen(here, evaluation, left, mass_of(here, evaluation))
     if worth_a_fit(promises, count_of(left)):
-        beside = replace(
-            search, here=here, evaluation=evaluation, found=list(search.found), rivals=list(search.rivals)
-        )
+        beside = replace(search.forked(), here=here, evaluation=evaluation)
         tried = trials(
             here,
             evaluation,
@@ -208,7 +206,7 @@ def _second_choices(
     for other in (*tried.done[1:], *tried.beaten):
         if misfit(other.evaluation) > AT_NOISE:
             continue
-        search = replace(before, found=list(before.found), rivals=list(before.rivals))
+        search = before.forked()
         search.adopt(tried, other)
         if misfit(search.evaluation) > AT_NOISE:
             continue

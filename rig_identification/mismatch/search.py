@@ -33,7 +33,6 @@ from rig_identification.mismatch.first_fits import (
     shows,
 )
 from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
-from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
@@ -46,6 +45,7 @@ from rig_identification.mismatch.trial import (
     amount_seen,
     attempt,
     beyond_doubt,
+    earned_evidence,
     finished,
     log_evidence,
     mass_of,
@@ -360,8 +360,8 @@ class _Look:
 
     def _fair(self, trial: Trial) -> Trial:
         """Near the noise: less what the trial only gains from the noise."""
-        less = 0.0 if self.far else unearned(self.here, self.seen, trial.evaluation.runs)
-        return replace(trial, evidence=log_evidence(trial.evaluation) - less)
+        evidence = earned_evidence(self.here, self.seen, trial.evaluation, far=self.far)
+        return replace(trial, evidence=evidence)
 
     def _missed(self, trial: Trial) -> bool:
         """Whether more is left without a trial, about where it ends: a change of numbers alone.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.mixture import Bodies
@@ -40,6 +40,10 @@ class Search:
     def whole(self) -> bool:
         """Whether hypotheses are tried on whole runs."""
         return len(self.here.runs) == len(self.problem.runs)
+
+    def forked(self) -> Search:
+        """The same search, to go on with by itself."""
+        return replace(self, found=list(self.found), rivals=list(self.rivals))
 
     def adopt(self, tried: Trials, chosen: Trial) -> None:
         """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals."""

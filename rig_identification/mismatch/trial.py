@@ -23,6 +23,7 @@ from rig_identification.estimate.prediction import Linearised, model_at
 from rig_identification.estimate.solve import HOPELESS, POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
@@ -75,6 +76,14 @@ def log_evidence(evaluation: Evaluation) -> float:
     """
     sign, log_det = np.linalg.slogdet(evaluation.information)
     return -evaluation.cost - 0.5 * float(log_det) if sign > 0 else -np.inf
+
+
+def earned_evidence(problem: Problem, before: Evaluation, after: Evaluation, *, far: bool) -> float:
+    """Log evidence of ``after``; near the noise, less what it only gains from that over ``before``.
+
+    problem: of ``before``, with the same runs. far: whether much was left.
+    """
+    return log_evidence(after) - (0.0 if far else unearned(problem, before, after.runs))
 
 
 def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Problem, Evaluation]:

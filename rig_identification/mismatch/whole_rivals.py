@@ -19,15 +19,12 @@ from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import BEATEN, at_noise
-from rig_identification.mismatch.in_motion import cost_in_motion, unearned
-from rig_identification.mismatch.late import SETTLING
+from rig_identification.mismatch.in_motion import cost_in_motion
+from rig_identification.mismatch.late import SETTLING, twins
 from rig_identification.mismatch.search import MEANT, Trials
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, among_places, log_evidence
+from rig_identification.mismatch.trial import Trial, among_places, earned_evidence
 from rig_identification.mismatch.whole_runs import as_fitted, whole_runs
-
-#: Effects that the noise of the exciter's force tells apart, and not the motion: see late.py.
-ALIKE = {"clock_offset", "sensor_lag"}
 
 
 def likeliest_whole(
@@ -48,7 +45,7 @@ def likeliest_whole(
     for trial in _close(first, (*tried.done[1:], *tried.beaten)):
         if search.budget.spent():
             break
-        its = replace(before, found=list(before.found), rivals=list(before.rivals))
+        its = before.forked()
         its.adopt(tried, trial)
         notify(", ".join(t.candidate.label for t in its.found))
         heard.append((trial, whole_runs(ideal, its), its))
@@ -86,7 +83,7 @@ def _close(first: Trial, others: tuple[Trial, ...]) -> list[Trial]:
         for t in others
         if first.evidence - t.evidence < BEATEN
         and len(t.candidate.parameters) <= plain
-        and {first.candidate.effect, t.candidate.effect} != ALIKE
+        and not twins(first.candidate, t.candidate)
         and at_noise(t)
     ]
 
@@ -97,7 +94,7 @@ def outdone(ideal: Ideal, first: Trial, traced: Explained, other: Trial, wholly:
     traced, wholly: whole runs with ``first`` and with ``other``. A doubt that lies a little beyond its
     tolerances is such a trace, and its evidence is charged for it already.
     """
-    if {first.candidate.effect, other.candidate.effect} == ALIKE:
+    if twins(first.candidate, other.candidate):
         costs = [cost_in_motion(e.fitted.problem, e.fitted.evaluation, SETTLING) for e in (wholly, traced)]
         return costs[0] - costs[1] > MEANT
     held = [held_out_densities(e.fitted) for e in (traced, wholly)]
@@ -107,7 +104,7 @@ def outdone(ideal: Ideal, first: Trial, traced: Explained, other: Trial, wholly:
 
 def _evidence(ideal: Ideal, trial: Trial, found: Explained) -> float:
     """Log evidence of whole runs with an effect; near the noise, less what is gained from that alone."""
-    before, after = ideal.fitted.evaluation, found.fitted.evaluation
-    near = misfit(before) <= NEAR_SQUARE
-    less = unearned(ideal.fitted.problem, before, after.runs) if near else 0.0
-    return among_places(replace(trial, evidence=log_evidence(after) - less)).evidence
+    before = ideal.fitted.evaluation
+    far = misfit(before) > NEAR_SQUARE
+    evidence = earned_evidence(ideal.fitted.problem, before, found.fitted.evaluation, far=far)
+    return among_places(replace(trial, evidence=evidence)).evidence
