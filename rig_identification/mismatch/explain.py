@@ -14,8 +14,15 @@ from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_
 from rig_identification.mismatch.lawful import law_of_pieces, lawful_instead
 from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
-from rig_identification.mismatch.push import outside, push_beside, with_push, without_push
-from rig_identification.mismatch.screen import screen, with_reference
+from rig_identification.mismatch.push import (
+    outside,
+    push_beside,
+    push_in_whole_runs,
+    with_pulse,
+    with_push,
+    without_push,
+)
+from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -84,6 +91,11 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     if beside is not None:
         return beside
     near = search.whole
+    if near:
+        search.screened = screen(here, evaluation, catalogue(here), mass_of(here, evaluation))
+        pulsed = _pulsed(ideal, search.screened, notify, budget)
+        if pulsed is not None:
+            return pulsed
     fresh = replace(search, found=[], rivals=[])
     beside_push = partial(_beside_push, ideal, notify=notify, budget=budget)
     best = named(ideal, search, notify, beside_push, law_of_pieces(ideal, fresh, notify))
@@ -101,6 +113,17 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         if pushed is not None:
             return pushed
     return unexplained(ideal, search, best, notify)
+
+
+def _pulsed(
+    ideal: Ideal, promises: list[Promise], notify: Notify, budget: Budget
+) -> Explained | None:
+    """What explains the session outside a push that whole runs show best of all; None: there is no such."""
+    pushed = push_in_whole_runs(ideal, promises, notify)
+    if pushed is None:
+        return None
+    pulse, rest = pushed
+    return with_pulse(explain(rest, [], notify, budget), rest, ideal, pulse)
 
 
 def _gentle_push(ideal: Ideal, problem: Problem, notify: Notify) -> Explained | None:

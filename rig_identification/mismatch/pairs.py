@@ -74,6 +74,8 @@ def first_of_two(
         return Led(first, False)
     ordinary = ordinary_errors(problem)
     kept = evaluation.cost - second.evaluation.cost - _cost((one, other), count) > max(alone, 0.0) + ahead
+    # What the first took away by itself, further along than first order saw, needs no other one
+    kept = kept and first.evaluation.cost - second.evaluation.cost > needed_gain(other, count)
     meant = all(beyond_doubt(replace(second, candidate=c), ordinary, limit) for c in (one, other))
     return Led(first, kept and meant)
 

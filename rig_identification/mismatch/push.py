@@ -10,10 +10,12 @@ import numpy as np
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fit_again, judged
-from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.locate import CALM, Event, at_an_end, find_event
+from rig_identification.mismatch.pulse import Pulse, likeliest_pulse, pulse_finding
+from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
@@ -26,6 +28,8 @@ Notify = Callable[[str, float], None]
 UNEVEN = 4.0
 #: What is cut off on either side of a push, s.
 MARGIN = 0.15
+#: Share of what is wrong in all runs that may be left outside a push for it to be the chief of it.
+OUTSIDE = 0.5
 
 
 def without_push(
@@ -49,7 +53,7 @@ def without_push(
         return None
     push, start, end = told
     for first, last in ((start, end), (event.start, event.end)):
-        whole = replace(problem, runs=all_without(problem.runs, event, first, last))
+        whole = replace(problem, runs=_all_without(problem.runs, event.recording, first, last))
         fitted = fit_whole(ideal.fitted, whole, here, event.point)
         after, verdict = judged(fitted)
         if verdict.verdict == "none":
@@ -96,7 +100,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
     event = find_event(search.here, search.evaluation)
     if event is None or at_an_end(event, search.here):
         return None
-    runs = all_without(search.problem.runs, event, event.start, event.end)
+    runs = _all_without(search.problem.runs, event.recording, event.start, event.end)
     found = whole_runs(ideal, replace(search, problem=replace(search.problem, runs=runs)))
     if found.mismatch.verdict != "explained" or found.trace:
         return None
@@ -106,7 +110,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
 def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
     """The ideal model fitted to all but the pieces that an event disturbs."""
     fitted = ideal.fitted
-    runs = all_without(fitted.problem.runs, event, event.start, event.end)
+    runs = _all_without(fitted.problem.runs, event.recording, event.start, event.end)
     return fit_again(ideal, runs, (*fitted.holdout_runs, *fitted.lost), notify)
 
 
@@ -116,8 +120,8 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
     Where every residual is noise in the push's seconds as well there is none, and what was found stands
     alone: a short piece lost its way without it.
     """
-    whole = _undisturbed(found, ideal)
-    if whole is not None:
+    whole, undisturbed = _everything(found, ideal)
+    if undisturbed:
         return replace(found, fitted=whole)
     fitted = found.fitted
     evaluation = fitted.evaluation
@@ -135,22 +139,71 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
     return replace(found, mismatch=mismatch)
 
 
-def _undisturbed(found: Explained, ideal: Ideal) -> Fitted | None:
-    """All of every run with the model found outside a push; None where that leaves something."""
+def _everything(found: Explained, ideal: Ideal) -> tuple[Fitted, bool]:
+    """All of every run with the model found outside a push, and whether that leaves nothing."""
     outside_of_it = found.fitted
     whole = replace(outside_of_it.problem, runs=ideal.fitted.problem.runs)
     fitted = fit_whole(ideal.fitted, whole, outside_of_it.problem, outside_of_it.evaluation.point)
-    return fitted if judged(fitted)[1].verdict == "none" else None
+    return fitted, judged(fitted)[1].verdict == "none"
 
 
-def all_without(runs: tuple[Run, ...], event: Event, start: float, end: float) -> tuple[Run, ...]:
+def push_in_whole_runs(ideal: Ideal, promises: list[Promise], notify: Notify) -> tuple[Pulse, Ideal] | None:
+    """A push that takes more away than anything of the catalogue, and the ideal model outside of it.
+
+    promises: what all others would take away, best first. None where there is no such push, or more than half
+    of what is wrong is so outside of it as well.
+    """
+    notify("search: a push", 0.05)
+    pulse = likeliest_pulse(ideal.fitted)
+    if pulse is None or pulse.net < max([0.0, *(p.gain for p in promises)]):
+        return None
+    fitted = ideal.fitted
+    runs = _all_without(fitted.problem.runs, pulse.recording, pulse.start, pulse.end)
+    held = _all_without(fitted.holdout_runs, pulse.recording, pulse.start, pulse.end)
+    rest = fit_again(ideal, runs, (*held, *fitted.lost), notify)
+    return None if _wrong(rest.fitted) > OUTSIDE * _wrong(fitted) else (pulse, rest)
+
+
+def _wrong(fitted: Fitted) -> float:
+    """Excess (nats) of all runs, held-out ones included."""
+    held = sum(0.5 * float(np.sum(run.residual**2) - run.residual.size) for run in fitted.holdouts)
+    return max(1.0, excess(fitted.evaluation) + held)
+
+
+def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse) -> Explained | None:
+    """What explains the session outside a push, and the push; None where something is left there.
+
+    found: what is told of the rest; None where the ideal model explains it. rest: that model's fit outside.
+    """
+    found = found or Explained(rest.fitted, rest.mismatch, rest)
+    if found.mismatch.verdict not in ("none", "explained") or found.trace:
+        return None
+    whole, undisturbed = _everything(found, ideal)
+    if undisturbed:
+        return replace(found, fitted=whole) if found.mismatch.verdict == "explained" else None
+    again = likeliest_pulse(whole)
+    if again is not None and again.overlaps(pulse):
+        pulse = again
+    after = judged(found.fitted)[0].holdout
+    push = pulse_finding(pulse)
+    evidence = evidence_of(ideal, found.fitted, after) | {"log_likelihood_gain": pulse.gain}
+    mismatch = Mismatch(
+        "explained",
+        f"Outside the push: {found.mismatch.explanation} {held_out_errors(ideal.scores.holdout, after)}",
+        (replace(push, evidence=evidence), *found.mismatch.findings),
+        found.mismatch.alternatives if found.mismatch.findings else (),
+    )
+    return replace(found, mismatch=mismatch)
+
+
+def _all_without(runs: tuple[Run, ...], recording: str, start: float, end: float) -> tuple[Run, ...]:
     """The stretches of all runs before and after a push."""
-    return tuple(part for run in runs for part in _without(run, event, start, end))
+    return tuple(part for run in runs for part in _without(run, recording, start, end))
 
 
-def _without(run: Run, event: Event, start: float, end: float) -> list[Run]:
+def _without(run: Run, recording: str, start: float, end: float) -> list[Run]:
     """A run's stretches before and after a push, where they are long enough to say something."""
-    if run.recording.name != event.recording:
+    if run.recording.name != recording:
         return [run]
     step = run.grid.step
     a = round((start - MARGIN - run.offset) / step)

@@ -130,9 +130,9 @@ def trials(
     led = None
     if more and not far:
         led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
-        if led is not None and led.leads:
-            return Trials([led.first])
     look = _Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
+    if led is not None and led.leads:
+        return Trials(look.told([led.first]))
     if led is not None and here is problem:
         look.fitted = led.first
     if misfit(seen) > VERY_FAR:
