@@ -10,7 +10,6 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import fit_session
 from rig_identification.mismatch.identify import identify
-from rig_identification.mismatch.locate import Event
 from rig_identification.mismatch.push import all_without
 from rig_identification.recording import Recording, Session
 from rig_identification.simulate import simulate_session
@@ -27,12 +26,15 @@ def _biased(recording: Recording) -> Recording:
     return replace(recording, imu=replace(recording.imu, values=values))
 
 
-def _pushed(recording: Recording) -> Recording:
-    """The recording as if part of its force had come from outside: the exciter's cell did not feel it."""
+def moved(recording: Recording, peak: float, start: float, lasts: float) -> Recording:
+    """The recording as if part of its force had come from outside: the exciter's cell did not feel it.
+
+    peak: N along the exciter's z. start, lasts: s of half a sine.
+    """
     force = recording.exciter_force
     assert force is not None
-    phase = (force.time - START) / LASTS
-    pulse = np.where((phase > 0.0) & (phase < 1.0), PUSH * np.sin(np.pi * np.clip(phase, 0.0, 1.0)), 0.0)
+    phase = (force.time - start) / lasts
+    pulse = np.where((phase > 0.0) & (phase < 1.0), peak * np.sin(np.pi * np.clip(phase, 0.0, 1.0)), 0.0)
     values = force.values.copy()
     values[:, 2] -= pulse
     return replace(recording, exciter_force=replace(force, values=values))
@@ -44,7 +46,9 @@ def session() -> Session:
     (run,) = spec.runs
     other = replace(run, name="run_2", holdout=True, duration=12.0)
     made = simulate_session(replace(spec, runs=(run, other)), np.random.default_rng(8))[0]
-    recordings = tuple(_biased(_pushed(r) if r.name == "run_1" else r) for r in made.recordings)
+    recordings = tuple(
+        _biased(moved(r, PUSH, START, LASTS) if r.name == "run_1" else r) for r in made.recordings
+    )
     return replace(made, recordings=recordings)
 
 
@@ -70,14 +74,11 @@ def test_a_push_leaves_other_stretches_of_its_recording_alone() -> None:
     whole = run.problem.runs[0]
     middle, last = whole.grid.nodes // 2, whole.grid.nodes - 1
     early, late = whole.between(0, middle), whole.between(middle, last)
-    event = Event(whole.recording.name, 2.0, 3.0, run.evaluation.point, ())
-    before, after, untouched = all_without((early, late), event, 2.0, 3.0)
+    before, after, untouched = all_without((early, late), whole.recording.name, 2.0, 3.0)
     assert untouched is late
     assert before.offset == early.offset
     assert after.offset > 3.0
-    assert [r.offset for r in all_without((late,), replace(event, recording="another"), 2.0, 3.0)] == [
-        late.offset
-    ]
+    assert [r.offset for r in all_without((late,), "another", 2.0, 3.0)] == [late.offset]
 
 
 def _quiet(stage: str, share: float) -> None:

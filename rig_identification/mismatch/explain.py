@@ -14,15 +14,17 @@ from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_
 from rig_identification.mismatch.lawful import law_of_pieces, lawful_instead
 from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
+from rig_identification.mismatch.pulse import Pulse, likeliest_pulse
 from rig_identification.mismatch.push import (
+    chiefly,
     outside,
+    outside_of_pulse,
     push_beside,
-    push_in_whole_runs,
     with_pulse,
     with_push,
     without_push,
 )
-from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.screen import screen, with_reference
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -79,23 +81,23 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     if ideal.mismatch.verdict == "none":
         return None
     fitted = ideal.fitted
+    notify("search: a push", 0.02)
+    pulse = likeliest_pulse(fitted)
+    pulsed = None if pulse is None else _pulsed(ideal, pulse, notify, budget)
+    if pulsed is not None:
+        return pulsed
     problem = with_reference(fitted.problem, fitted.rest)
     here, evaluation = short_pieces(ideal) or (problem, evaluate(problem, fitted.evaluation.point))
     if evaluation is None:
         return None
     search = Search(problem, here, evaluation, excess(evaluation), budget)
-    pushed = None if search.whole else without_push(ideal, problem, here, evaluation, notify)
+    pushed = None if search.whole else without_push(ideal, problem, here, evaluation, pulse, notify)
     if pushed is not None:
         return pushed
     beside = None if search.whole else _beside_push(ideal, here, evaluation, notify, budget)
     if beside is not None:
         return beside
     near = search.whole
-    if near:
-        search.screened = screen(here, evaluation, catalogue(here), mass_of(here, evaluation))
-        pulsed = _pulsed(ideal, search.screened, notify, budget)
-        if pulsed is not None:
-            return pulsed
     fresh = replace(search, found=[], rivals=[])
     beside_push = partial(_beside_push, ideal, notify=notify, budget=budget)
     best = named(ideal, search, notify, beside_push, law_of_pieces(ideal, fresh, notify))
@@ -109,27 +111,29 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         if law is not None:
             return law
         ideal = with_pieces(ideal, notify)
-        pushed = _gentle_push(ideal, problem, notify)
+        pushed = _gentle_push(ideal, problem, pulse, notify)
         if pushed is not None:
             return pushed
     return unexplained(ideal, search, best, notify)
 
 
-def _pulsed(
-    ideal: Ideal, promises: list[Promise], notify: Notify, budget: Budget
-) -> Explained | None:
-    """What explains the session outside a push that whole runs show best of all; None: there is no such."""
-    pushed = push_in_whole_runs(ideal, promises, notify)
-    if pushed is None:
+def _pulsed(ideal: Ideal, pulse: Pulse, notify: Notify, budget: Budget) -> Explained | None:
+    """What explains the session outside a push that takes most away; None where none does, or nothing."""
+    fitted = ideal.fitted
+    if not chiefly(pulse, fitted):
         return None
-    pulse, rest = pushed
-    return with_pulse(explain(rest, [], notify, budget), rest, ideal, pulse)
+    problem = with_reference(fitted.problem, fitted.rest)
+    promises = screen(problem, fitted.evaluation, catalogue(problem), mass_of(problem, fitted.evaluation))
+    if promises and promises[0].gain > pulse.net:
+        return None
+    rest = outside_of_pulse(ideal, pulse, notify)
+    return None if rest is None else with_pulse(explain(rest, [], notify, budget), rest, ideal, pulse)
 
 
-def _gentle_push(ideal: Ideal, problem: Problem, notify: Notify) -> Explained | None:
+def _gentle_push(ideal: Ideal, problem: Problem, pulse: Pulse | None, notify: Notify) -> Explained | None:
     """A push so gentle that whole runs come near the noise with it."""
     here, evaluation = short_pieces(ideal) or (problem, None)
-    return None if evaluation is None else without_push(ideal, problem, here, evaluation, notify)
+    return None if evaluation is None else without_push(ideal, problem, here, evaluation, pulse, notify)
 
 
 def _beside_push(

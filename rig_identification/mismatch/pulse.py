@@ -34,8 +34,8 @@ from rig_identification.result import Finding
 
 Array = NDArray[np.float64]
 
-#: Durations (s) that are scanned, each at starts this share of it apart; so many pulses are tried at once. What
-#: is shorter or longer has its momentum at much the same time.
+#: Durations (s) that are scanned, each at starts this share of it apart; so many pulses are tried at once.
+#: What is shorter or longer has its momentum at much the same time.
 DURATIONS, APART, AT_ONCE = (0.5, 1.5), 0.3, 16
 #: Prior std of a push, as a share of the body's weight: a hand's, a gust's.
 LIKELY = 0.05
@@ -63,9 +63,9 @@ class Pulse:
         """Log Bayes factor, roughly, against no push."""
         return self.gain - self.charge
 
-    def overlaps(self, other: Pulse) -> bool:
-        """Whether both act at some time."""
-        return self.recording == other.recording and self.start < other.end and other.start < self.end
+    def within(self, recording: str, start: float, end: float) -> bool:
+        """Whether it is likelier than none, and acts at some time of a stretch (s) of a recording."""
+        return self.net > 0.0 and self.recording == recording and self.start < end and start < self.end
 
 
 def likeliest_pulse(fitted: Fitted) -> Pulse | None:
@@ -206,7 +206,7 @@ class _Train:
             six = slice(6 * i, 6 * i + 6)
             part = columns.part(six)
             information = part.information([own[:, six]])
-            amounts = np.linalg.solve(information + np.diag(self._prior), part.right)
+            amounts = np.asarray(np.linalg.solve(information + np.diag(self._prior), part.right), float)
             out.append(_Shot(begin, duration, 0.5 * float(part.right @ amounts), amounts, information))
         return out
 

@@ -15,7 +15,6 @@ from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.locate import CALM, Event, at_an_end, find_event
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse, pulse_finding
-from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
@@ -33,11 +32,16 @@ OUTSIDE = 0.5
 
 
 def without_push(
-    ideal: Ideal, problem: Problem, here: Problem, evaluation: Evaluation, notify: Notify
+    ideal: Ideal,
+    problem: Problem,
+    here: Problem,
+    evaluation: Evaluation,
+    pulse: Pulse | None,
+    notify: Notify,
 ) -> Explained | None:
     """The session without the seconds in which something pushed; None where nothing did, or more is wrong.
 
-    problem: whole runs. here, evaluation: their short pieces, fitted.
+    problem: whole runs. here, evaluation: their short pieces, fitted. pulse: the likeliest push of all runs.
     """
     squares = [float(np.mean(run.residual**2)) for run in evaluation.runs]
     if max(squares) < UNEVEN * float(np.median(squares)) and np.median(squares) > CALM:
@@ -46,6 +50,10 @@ def without_push(
     event = find_event(here, evaluation)
     if event is None:
         return None
+    seen = pulse is not None and pulse.within(event.recording, event.start, event.end)
+    if at_an_end(event, here) and not seen:
+        # What begins or dies away shows there as well
+        return None
     mass = mass_of(here, evaluation)
     at = replace(evaluation, point=event.point)
     told = push_finding(here, at, ideal.fitted.rest, mass, event)
@@ -53,7 +61,7 @@ def without_push(
         return None
     push, start, end = told
     for first, last in ((start, end), (event.start, event.end)):
-        whole = replace(problem, runs=_all_without(problem.runs, event.recording, first, last))
+        whole = replace(problem, runs=all_without(problem.runs, event.recording, first, last))
         fitted = fit_whole(ideal.fitted, whole, here, event.point)
         after, verdict = judged(fitted)
         if verdict.verdict == "none":
@@ -62,6 +70,8 @@ def without_push(
         return None
     if (first, last) != (start, end):
         push = _gentle(push, event)
+    if pulse is not None and seen:
+        push = pulse_finding(pulse)
     evidence = evidence_of(ideal, fitted, after.holdout)
     text = f"Outside the push every residual is noise. {held_out_errors(ideal.scores.holdout, after.holdout)}"
     return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
@@ -100,7 +110,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
     event = find_event(search.here, search.evaluation)
     if event is None or at_an_end(event, search.here):
         return None
-    runs = _all_without(search.problem.runs, event.recording, event.start, event.end)
+    runs = all_without(search.problem.runs, event.recording, event.start, event.end)
     found = whole_runs(ideal, replace(search, problem=replace(search.problem, runs=runs)))
     if found.mismatch.verdict != "explained" or found.trace:
         return None
@@ -110,7 +120,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
 def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
     """The ideal model fitted to all but the pieces that an event disturbs."""
     fitted = ideal.fitted
-    runs = _all_without(fitted.problem.runs, event.recording, event.start, event.end)
+    runs = all_without(fitted.problem.runs, event.recording, event.start, event.end)
     return fit_again(ideal, runs, (*fitted.holdout_runs, *fitted.lost), notify)
 
 
@@ -130,7 +140,10 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
     if told is None:
         return None
     after = judged(fitted)[0].holdout
-    push = replace(told[0], evidence=evidence_of(ideal, fitted, after))
+    pulse = likeliest_pulse(whole)
+    seen = pulse is not None and pulse.within(event.recording, event.start, event.end)
+    push = pulse_finding(pulse) if pulse is not None and seen else told[0]
+    push = replace(push, evidence=evidence_of(ideal, fitted, after))
     mismatch = replace(
         found.mismatch,
         explanation=f"Outside the push: {found.mismatch.explanation}",
@@ -147,21 +160,18 @@ def _everything(found: Explained, ideal: Ideal) -> tuple[Fitted, bool]:
     return fitted, judged(fitted)[1].verdict == "none"
 
 
-def push_in_whole_runs(ideal: Ideal, promises: list[Promise], notify: Notify) -> tuple[Pulse, Ideal] | None:
-    """A push that takes more away than anything of the catalogue, and the ideal model outside of it.
+def chiefly(pulse: Pulse, fitted: Fitted) -> bool:
+    """Whether a push may take most of what is wrong in all runs away."""
+    return pulse.net > (1.0 - OUTSIDE) * _wrong(fitted)
 
-    promises: what all others would take away, best first. None where there is no such push, or more than half
-    of what is wrong is so outside of it as well.
-    """
-    notify("search: a push", 0.05)
-    pulse = likeliest_pulse(ideal.fitted)
-    if pulse is None or pulse.net < max([0.0, *(p.gain for p in promises)]):
-        return None
+
+def outside_of_pulse(ideal: Ideal, pulse: Pulse, notify: Notify) -> Ideal | None:
+    """The ideal model outside of a push; None where as much is wrong there as well."""
     fitted = ideal.fitted
-    runs = _all_without(fitted.problem.runs, pulse.recording, pulse.start, pulse.end)
-    held = _all_without(fitted.holdout_runs, pulse.recording, pulse.start, pulse.end)
+    runs = all_without(fitted.problem.runs, pulse.recording, pulse.start, pulse.end)
+    held = all_without(fitted.holdout_runs, pulse.recording, pulse.start, pulse.end)
     rest = fit_again(ideal, runs, (*held, *fitted.lost), notify)
-    return None if _wrong(rest.fitted) > OUTSIDE * _wrong(fitted) else (pulse, rest)
+    return None if _wrong(rest.fitted) > OUTSIDE * _wrong(fitted) else rest
 
 
 def _wrong(fitted: Fitted) -> float:
@@ -182,7 +192,7 @@ def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse)
     if undisturbed:
         return replace(found, fitted=whole) if found.mismatch.verdict == "explained" else None
     again = likeliest_pulse(whole)
-    if again is not None and again.overlaps(pulse):
+    if again is not None and again.within(pulse.recording, pulse.start, pulse.end):
         pulse = again
     after = judged(found.fitted)[0].holdout
     push = pulse_finding(pulse)
@@ -196,7 +206,7 @@ def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse)
     return replace(found, mismatch=mismatch)
 
 
-def _all_without(runs: tuple[Run, ...], recording: str, start: float, end: float) -> tuple[Run, ...]:
+def all_without(runs: tuple[Run, ...], recording: str, start: float, end: float) -> tuple[Run, ...]:
     """The stretches of all runs before and after a push."""
     return tuple(part for run in runs for part in _without(run, recording, start, end))
 

@@ -1,0 +1,57 @@
+"""A push far below the noise of any second, which the rest of its run remembers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_mismatch_push_beside import moved
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.mismatch.identify import identify
+from rig_identification.mismatch.pulse import likeliest_pulse
+from rig_identification.recording import Session
+from rig_identification.simulate import simulate_session
+
+PUSH, START, LASTS = 25.0, 9.0, 0.8  # N at the peak along the exciter's z; s
+
+
+def _session(pushed: str | None) -> Session:
+    """Two runs, the second held out; in one of them something pushes."""
+    spec = shaken(14, 20.0)
+    (run,) = spec.runs
+    other = replace(run, name="run_2", holdout=True, duration=16.0)
+    made = simulate_session(replace(spec, runs=(run, other)), np.random.default_rng(11))[0]
+    recordings = tuple(moved(r, PUSH, START, LASTS) if r.name == pushed else r for r in made.recordings)
+    return replace(made, recordings=recordings)
+
+
+def _quiet(stage: str, fraction: float) -> None:
+    """No progress."""
+
+
+@pytest.mark.parametrize("pushed", ["run_1", "run_2"])
+def test_a_gentle_push_is_found_in_a_fitted_run_and_in_one_held_out(pushed: str) -> None:
+    found = identify(_session(pushed))
+    assert found.mismatch.verdict == "explained"
+    (push,) = found.mismatch.findings
+    assert push.effect == "external_force"
+    (times,) = push.where["times"]  # type: ignore[misc]
+    assert times["recording"] == pushed
+    assert times["start"] == pytest.approx(START, abs=0.1)
+    assert times["end"] == pytest.approx(START + LASTS, abs=0.1)
+    peak = np.array([push.parameters[f"peak_force_{a}"]["value"] for a in "xyz"])
+    stds = np.array([push.parameters[f"peak_force_{a}"]["std"] for a in "xyz"])
+    assert np.linalg.norm(peak) == pytest.approx(PUSH, abs=4.0 * float(np.max(stds)))
+    assert found.holdout_error is not None
+    assert found.holdout_error < 1.1
+
+
+def test_noise_alone_holds_no_push() -> None:
+    fitted = fit_session(_session(None), _quiet, None)
+    assert Ideal(fitted, *judged(fitted)).mismatch.verdict == "none"
+    pulse = likeliest_pulse(fitted)
+    assert pulse is not None
+    assert pulse.net < 0.0
