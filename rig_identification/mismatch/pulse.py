@@ -39,7 +39,8 @@ Array = NDArray[np.float64]
 DURATIONS, APART, AT_ONCE = (0.5, 1.5), 0.3, 16
 #: Prior std of a push, as a share of the body's weight: a hand's, a gust's.
 LIKELY = 0.05
-#: Steps of the simplex that finds start and duration, and their ends of its first triangle: s, and log.
+#: Steps of the simplex that finds start and duration, and the sides of its first triangle: in durations,
+#: and in the log of the duration.
 STEPS, NUDGE = 60, (0.25, 0.2)
 #: Share by which the peak of another course of the same momentum differs.
 COURSE = 0.05
@@ -227,7 +228,8 @@ def pulse_finding(pulse: Pulse) -> Finding:
     peaks |= {f"peak_force_{a}": (float(pulse.force[i]), float(stds[i]), "N") for i, a in enumerate(AXES)}
     text = (
         f"Something pushes the body from {pulse.start:.2f} to {pulse.end:.2f} s of {pulse.recording}, with "
-        f"up to {size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These seconds "
-        "are left out of the fit. Keep people and draughts away from the rig, or cut the recording there."
+        f"up to {size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. Where along its "
+        "line it acts no motion tells. These seconds are left out of the fit. Keep people and draughts away "
+        "from the rig, or cut the recording there."
     )
     return Finding("external_force", where, written(peaks), {}, text)
