@@ -149,7 +149,7 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
         explanation=f"Outside the push: {found.mismatch.explanation}",
         findings=(*found.mismatch.findings, push),
     )
-    return replace(found, mismatch=mismatch)
+    return replace(found, mismatch=mismatch, ideal=ideal)
 
 
 def _everything(found: Explained, ideal: Ideal) -> tuple[Fitted, bool]:
@@ -203,7 +203,7 @@ def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse)
         (replace(push, evidence=evidence), *found.mismatch.findings),
         found.mismatch.alternatives if found.mismatch.findings else (),
     )
-    return replace(found, mismatch=mismatch)
+    return replace(found, mismatch=mismatch, ideal=ideal)
 
 
 def all_without(runs: tuple[Run, ...], recording: str, start: float, end: float) -> tuple[Run, ...]:
