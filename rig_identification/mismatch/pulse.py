@@ -83,15 +83,15 @@ def likeliest_pulse(fitted: Fitted) -> Pulse | None:
     mass = mass_of(problem, evaluation)
     weight = LIKELY * mass * problem.bench.rig.gravity
     prior = 1.0 / np.repeat([weight, weight * float(np.max(extent(problem.bench.rig)))], 3) ** 2
-    trains = [_Train(problem, evaluation, beyond, index, prior) for index in range(len(problem.runs))]
+    every = [_Pulses(problem, evaluation, beyond, index, prior) for index in range(len(problem.runs))]
     # What takes the time holds no lock
     with ThreadPoolExecutor(max_workers=2) as pool:
-        scans = list(pool.map(_Train.scanned, trains))
-    train, (best, _) = max(zip(trains, scans, strict=True), key=lambda found: _gain(found[1][0]))
+        scans = list(pool.map(_Pulses.scanned, every))
+    pulses, (best, _) = max(zip(every, scans, strict=True), key=lambda found: _gain(found[1][0]))
     if best is None:
         return None
     tried = float(np.log(sum(count for _, count in scans)))
-    return train.told(train.polished(best), tried, middle_of(problem.bench.rig))
+    return pulses.told(pulses.polished(best), tried, middle_of(problem.bench.rig))
 
 
 def _gain(shot: _Shot | None) -> float:
@@ -121,7 +121,7 @@ class _Shot:
     information: Array  # (6, 6)
 
 
-class _Train:
+class _Pulses:
     """Pulses in one run of a linearised problem."""
 
     def __init__(
