@@ -228,8 +228,8 @@ def pulse_finding(pulse: Pulse) -> Finding:
     peaks |= {f"peak_force_{a}": (float(pulse.force[i]), float(stds[i]), "N") for i, a in enumerate(AXES)}
     text = (
         f"Something pushes the body from {pulse.start:.2f} to {pulse.end:.2f} s of {pulse.recording}, with "
-        f"up to {size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. Where along its "
-        "line it acts no motion tells. These seconds are left out of the fit. Keep people and draughts away "
+        f"up to {size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. No motion "
+        "tells where along its line it acts. These seconds are left out of the fit. Keep people and draughts away "
         "from the rig, or cut the recording there."
     )
     return Finding("external_force", where, written(peaks), {}, text)
