@@ -229,7 +229,7 @@ def pulse_finding(pulse: Pulse) -> Finding:
     text = (
         f"Something pushes the body from {pulse.start:.2f} to {pulse.end:.2f} s of {pulse.recording}, with "
         f"up to {size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. No motion "
-        "tells where along its line it acts. These seconds are left out of the fit. Keep people and draughts away "
-        "from the rig, or cut the recording there."
+        "tells where along its line it acts. These seconds are left out of the fit. Keep people and "
+        "draughts away from the rig, or cut the recording there."
     )
     return Finding("external_force", where, written(peaks), {}, text)
