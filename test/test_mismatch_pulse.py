@@ -28,10 +28,6 @@ def _session(pushed: str | None) -> Session:
     return replace(made, recordings=recordings)
 
 
-def _quiet(stage: str, fraction: float) -> None:
-    """No progress."""
-
-
 @pytest.mark.parametrize("pushed", ["run_1", "run_2"])
 def test_a_gentle_push_is_found_in_a_fitted_run_and_in_one_held_out(pushed: str) -> None:
     found = identify(_session(pushed))
@@ -50,7 +46,7 @@ def test_a_gentle_push_is_found_in_a_fitted_run_and_in_one_held_out(pushed: str)
 
 
 def test_noise_alone_holds_no_push() -> None:
-    fitted = fit_session(_session(None), _quiet, None)
+    fitted = fit_session(_session(None))
     assert Ideal(fitted, *judged(fitted)).mismatch.verdict == "none"
     pulse = likeliest_pulse(fitted)
     assert pulse is not None

@@ -143,7 +143,7 @@ def _beside_push(
     event = push_beside(here, evaluation, notify)
     if event is None:
         return None
-    found = _explain(outside(ideal, event, notify), notify, budget)
+    found = _explain(outside(ideal, event.recording, event.start, event.end, notify), notify, budget)
     if found is None or found.mismatch.verdict != "explained":
         return None
     return with_push(found, ideal, here, event)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rig_identification.estimate.identify import parameter_estimates
+from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Told
 from rig_identification.mismatch.experiments import experiment_for
 from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Finding
+
+Array = NDArray[np.float64]
 
 
 def finding(
@@ -55,3 +61,30 @@ def rival(trial: Trial, gap: float) -> dict[str, object]:
 def written(told: Told) -> dict[str, dict[str, object]]:
     """Values with their std and unit as ``result.json`` has them."""
     return {name: {"value": float(v), "std": float(s), "unit": unit} for name, (v, s, unit) in told.items()}
+
+
+def pushed(
+    recording: str, start: float, end: float, force: Array, stds: Array, point: Array, beside: str = ""
+) -> Finding:
+    """A push from outside, without evidence.
+
+    start, end: s after the recording's start. force, stds: (3,) N at the peak, world. point: (3,) m, body.
+    beside: what else is to be said of it, a sentence and a space.
+    """
+    axis = int(np.argmax(np.abs(force)))
+    where: dict[str, object] = {
+        "channel": None,
+        "axis": AXES[axis],
+        "position": [float(v) for v in point],
+        "times": [{"recording": recording, "start": round(start, 3), "end": round(end, 3)}],
+    }
+    peaks = {"peak_force": (float(force[axis]), float(stds[axis]), "N")}
+    peaks |= {f"peak_force_{a}": (float(force[i]), float(stds[i]), "N") for i, a in enumerate(AXES)}
+    size = float(np.linalg.norm(force))
+    text = (
+        f"Something pushes the body from {start:.2f} to {end:.2f} s of {recording}, with up to "
+        f"{size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. "
+        f"{beside}These seconds are left out of the fit. Keep people and draughts away from the rig, or cut "
+        "the recording there."
+    )
+    return Finding("external_force", where, written(peaks), {}, text)

@@ -22,10 +22,9 @@ from scipy.optimize import minimize
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
-from rig_identification.mismatch.findings import written
+from rig_identification.mismatch.findings import pushed
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.screen import free_without, with_reference
@@ -214,22 +213,6 @@ class _Pulses:
 
 def pulse_finding(pulse: Pulse) -> Finding:
     """A push in words and numbers, without evidence."""
-    axis = int(np.argmax(np.abs(pulse.force)))
-    size = float(np.linalg.norm(pulse.force))
     stds = np.hypot(pulse.std, COURSE * np.abs(pulse.force))
-    times = [{"recording": pulse.recording, "start": round(pulse.start, 3), "end": round(pulse.end, 3)}]
-    where: dict[str, object] = {
-        "channel": None,
-        "axis": AXES[axis],
-        "position": [float(v) for v in pulse.point],
-        "times": times,
-    }
-    peaks = {"peak_force": (float(pulse.force[axis]), float(stds[axis]), "N")}
-    peaks |= {f"peak_force_{a}": (float(pulse.force[i]), float(stds[i]), "N") for i, a in enumerate(AXES)}
-    text = (
-        f"Something pushes the body from {pulse.start:.2f} to {pulse.end:.2f} s of {pulse.recording}, with "
-        f"up to {size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. No motion "
-        "tells where along its line it acts. These seconds are left out of the fit. Keep people and "
-        "draughts away from the rig, or cut the recording there."
-    )
-    return Finding("external_force", where, written(peaks), {}, text)
+    beside = "No motion tells where along its line it acts. "
+    return pushed(pulse.recording, pulse.start, pulse.end, pulse.force, stds, pulse.point, beside)

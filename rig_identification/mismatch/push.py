@@ -68,10 +68,10 @@ def without_push(
             break
     else:
         return None
-    if (first, last) != (start, end):
-        push = _gentle(push, event)
     if pulse is not None and seen:
         push = pulse_finding(pulse)
+    elif (first, last) != (start, end):
+        push = _gentle(push, event)
     evidence = evidence_of(ideal, fitted, after.holdout)
     text = f"Outside the push every residual is noise. {held_out_errors(ideal.scores.holdout, after.holdout)}"
     return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
@@ -117,11 +117,12 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
     return with_push(found, ideal, search.here, event)
 
 
-def outside(ideal: Ideal, event: Event, notify: Notify) -> Ideal:
-    """The ideal model fitted to all but the pieces that an event disturbs."""
+def outside(ideal: Ideal, recording: str, start: float, end: float, notify: Notify) -> Ideal:
+    """The ideal model fitted to all but the seconds of a recording in which something pushes."""
     fitted = ideal.fitted
-    runs = all_without(fitted.problem.runs, event.recording, event.start, event.end)
-    return fit_again(ideal, runs, (*fitted.holdout_runs, *fitted.lost), notify)
+    runs = all_without(fitted.problem.runs, recording, start, end)
+    held = all_without(fitted.holdout_runs, recording, start, end)
+    return fit_again(ideal, runs, (*held, *fitted.lost), notify)
 
 
 def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Explained | None:
@@ -140,9 +141,8 @@ def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Ex
     if told is None:
         return None
     after = judged(fitted)[0].holdout
-    pulse = likeliest_pulse(whole)
-    seen = pulse is not None and pulse.within(event.recording, event.start, event.end)
-    push = pulse_finding(pulse) if pulse is not None and seen else told[0]
+    pulse = _pulse_within(whole, event.recording, event.start, event.end)
+    push = told[0] if pulse is None else pulse_finding(pulse)
     push = replace(push, evidence=evidence_of(ideal, fitted, after))
     mismatch = replace(
         found.mismatch,
@@ -160,6 +160,12 @@ def _everything(found: Explained, ideal: Ideal) -> tuple[Fitted, bool]:
     return fitted, judged(fitted)[1].verdict == "none"
 
 
+def _pulse_within(whole: Fitted, recording: str, start: float, end: float) -> Pulse | None:
+    """The push that whole runs show with what was found in the model, if it is the one looked for."""
+    pulse = likeliest_pulse(whole)
+    return pulse if pulse is not None and pulse.within(recording, start, end) else None
+
+
 def chiefly(pulse: Pulse, fitted: Fitted) -> bool:
     """Whether a push may take most of what is wrong in all runs away."""
     return pulse.net > (1.0 - OUTSIDE) * _wrong(fitted)
@@ -167,11 +173,8 @@ def chiefly(pulse: Pulse, fitted: Fitted) -> bool:
 
 def outside_of_pulse(ideal: Ideal, pulse: Pulse, notify: Notify) -> Ideal | None:
     """The ideal model outside of a push; None where as much is wrong there as well."""
-    fitted = ideal.fitted
-    runs = all_without(fitted.problem.runs, pulse.recording, pulse.start, pulse.end)
-    held = all_without(fitted.holdout_runs, pulse.recording, pulse.start, pulse.end)
-    rest = fit_again(ideal, runs, (*held, *fitted.lost), notify)
-    return None if _wrong(rest.fitted) > OUTSIDE * _wrong(fitted) else rest
+    rest = outside(ideal, pulse.recording, pulse.start, pulse.end, notify)
+    return None if _wrong(rest.fitted) > OUTSIDE * _wrong(ideal.fitted) else rest
 
 
 def _wrong(fitted: Fitted) -> float:
@@ -191,9 +194,7 @@ def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse)
     whole, undisturbed = _everything(found, ideal)
     if undisturbed:
         return replace(found, fitted=whole) if found.mismatch.verdict == "explained" else None
-    again = likeliest_pulse(whole)
-    if again is not None and again.within(pulse.recording, pulse.start, pulse.end):
-        pulse = again
+    pulse = _pulse_within(whole, pulse.recording, pulse.start, pulse.end) or pulse
     after = judged(found.fitted)[0].holdout
     push = pulse_finding(pulse)
     evidence = evidence_of(ideal, found.fitted, after) | {"log_likelihood_gain": pulse.gain}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
-from rig_identification.mismatch.findings import written
+from rig_identification.mismatch.findings import pushed, written
 from rig_identification.mismatch.latent import MissingWrench, joined, missing_wrench, strongest_push
 from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.locate import Event
@@ -47,25 +47,9 @@ def push_finding(
     if missing is None:
         return None
     push = strongest_push(missing, middle_of(problem.bench.rig))
-    axis = int(np.argmax(np.abs(push.peak)))
-    value = float(push.peak[axis])
-    std = float(np.hypot(push.std, SMEARED * push.size))
-    times = [{"recording": event.recording, "start": round(push.start, 3), "end": round(push.end, 3)}]
-    where: dict[str, object] = {
-        "channel": None,
-        "axis": AXES[axis],
-        "position": [float(v) for v in push.point],
-        "times": times,
-    }
-    peaks = {"peak_force": (value, std, "N")}
-    peaks |= {f"peak_force_{a}": (float(push.peak[i]), std, "N") for i, a in enumerate(AXES)}
-    text = (
-        f"Something pushes the body from {push.start:.2f} to {push.end:.2f} s of {event.recording}, with "
-        f"up to {push.size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. These "
-        "seconds are left out of the fit. Keep people and draughts away from the rig, or cut the recording "
-        "there."
-    )
-    return Finding("external_force", where, written(peaks), {}, text), push.start, push.end
+    stds = np.full(3, np.hypot(push.std, SMEARED * push.size))
+    told = pushed(event.recording, push.start, push.end, push.peak, stds, push.point)
+    return told, push.start, push.end
 
 
 def unknown_finding(
