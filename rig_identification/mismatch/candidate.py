@@ -48,9 +48,14 @@ class Candidate:
         return all(p.freed for p in self.parameters)
 
     @property
+    def many(self) -> bool:
+        """Whether it has numbers enough to bend to what is none of it: a hose, a rider."""
+        return len(self.parameters) >= MANY
+
+    @property
     def slow(self) -> bool:
         """Whether a fit takes ten times as long as that of a sensor's error."""
-        return self.build is not None or len(self.parameters) >= MANY
+        return self.build is not None or self.many
 
     @property
     def label(self) -> str:

@@ -12,7 +12,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH
-from rig_identification.mismatch.candidate import MANY, Candidate
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.riders import SWINGS
@@ -78,7 +78,7 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
     out: list[Promise] = []
     for p in worthy:
         alike = sum(q.candidate.effect == p.candidate.effect for q in out)
-        most = ALIKE if len(p.candidate.parameters) < MANY else ALIKE_IF_MANY
+        most = ALIKE_IF_MANY if p.candidate.many else ALIKE
         # A hose's nine numbers promise more of anything, and take no place from what is fitted in a second
         others = out if p.candidate.slow else [q for q in out if not q.candidate.slow]
         if p.gain > WORTH * worthy[0].gain and alike < most and len(others) < FITTED:

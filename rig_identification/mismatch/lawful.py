@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, settled_starts
 from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.first_fits import AT_NOISE
+from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.first_fits import AT_NOISE, BEATEN
 from rig_identification.mismatch.measured import fitting_wrench
 from rig_identification.mismatch.point_laws import (
     SEEN,
@@ -31,10 +33,11 @@ from rig_identification.mismatch.point_laws import (
     sparser,
 )
 from rig_identification.mismatch.screen import Promise, carried, extended
-from rig_identification.mismatch.search import Law, Trials, worst_pieces
+from rig_identification.mismatch.search import MEANT, Law, Trials, worst_pieces
 from rig_identification.mismatch.standing import EXPLAINED, Search
 from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, promised
-from rig_identification.mismatch.whole_runs import whole_runs
+from rig_identification.mismatch.whole_rivals import ahead_by
+from rig_identification.mismatch.whole_runs import as_fitted, whole_runs
 
 Array = NDArray[np.float64]
 Notify = Callable[[str, float], None]
@@ -49,10 +52,17 @@ FITTED = 2
 CERTAIN = 2.0 * SEEN
 
 
-def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explained | None:
+def lawful(
+    ideal: Ideal,
+    search: Search,
+    trial: Trial,
+    notify: Notify,
+    instead: tuple[Trial, Explained] | None = None,
+) -> Explained | None:
     """What explains all runs with a law in the model; None where it does not.
 
-    search: as it stands at the ideal model; it is left as it is.
+    search: as it stands at the ideal model; it is left as it is. instead: an entry of the catalogue that
+    explains the session, but for a trace perhaps; the law has to be likelier.
     """
     own = replace(search, found=[], rivals=[], screened=None)
     own.adopt(Trials([trial]), trial)
@@ -60,11 +70,27 @@ def lawful(ideal: Ideal, search: Search, trial: Trial, notify: Notify) -> Explai
         return None
     notify("search: whole runs with the law", 0.8)
     best = whole_runs(ideal, own)
-    if best.mismatch.verdict != "explained" or best.trace:
-        # A name of the catalogue may leave a trace; what has no name has nothing else to speak for it
+    if best.mismatch.verdict != "explained":
         return None
-    finding = law_finding(best.fitted, trial.candidate, best.mismatch.findings[0])
-    return replace(best, mismatch=replace(best.mismatch, findings=(finding,)))
+    told = replace(
+        best.mismatch, findings=(law_finding(best.fitted, trial.candidate, best.mismatch.findings[0]),)
+    )
+    if instead is None:
+        # A name of the catalogue may leave a trace; what has no name has nothing else to speak for it
+        return None if best.trace else replace(best, mismatch=told)
+    name, named = instead
+    if best.trace and not named.trace:
+        return None
+    gap = ahead_by(ideal, (trial, best), instead)
+    if gap < (MEANT if best.trace or not named.trace else -BEATEN):
+        # As of two names, what explains it all goes before what leaves a trace unless it is outdone
+        return None
+    fitted = as_fitted(named.fitted, name)
+    return replace(
+        best,
+        mismatch=replace(told, alternatives=(rival(fitted, gap), *told.alternatives)),
+        bodies=(*best.bodies, (gap, inertial_estimate(fitted.problem, fitted.evaluation))),
+    )
 
 
 def law_of_pieces(ideal: Ideal, search: Search, notify: Notify) -> Law:
@@ -81,11 +107,16 @@ def law_of_pieces(ideal: Ideal, search: Search, notify: Notify) -> Law:
 
 
 def lawful_instead(
-    ideal: Ideal, search: Search, notify: Notify, first: Trial | None = None
+    ideal: Ideal,
+    search: Search,
+    notify: Notify,
+    first: Trial | None = None,
+    explained: Explained | None = None,
 ) -> Explained | None:
     """What explains all runs with a law where the catalogue did not; None where nothing does.
 
-    search: as it stood before the catalogue's turn. first: hypothesis that short pieces did not refute.
+    search: as it stood before the catalogue's turn. first: hypothesis that short pieces did not refute, and
+    what it ``explained`` of whole runs, where it did.
     """
     here, evaluation = search.here, search.evaluation
     if not search.whole:
@@ -96,7 +127,8 @@ def lawful_instead(
     same = first is not None and len(first.problem.runs) == len(here.runs)
     if first is not None and same and trial.evidence < first.evidence:
         return None
-    return lawful(ideal, search, trial, notify)
+    instead = (first, explained) if first is not None and explained is not None else None
+    return lawful(ideal, search, trial, notify, instead)
 
 
 def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Budget) -> Trial | None:

@@ -93,6 +93,13 @@ def named(
             continue
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = whole_runs(ideal, search)
+        asked = law is not None and not step and not before.whole
+        if asked and best.mismatch.verdict == "explained" and first.candidate.many:
+            # A few kilograms that swing within the body, damped well, bend to many a law of one point
+            asked = False
+            told = _lawful(partial(lawful_instead, ideal, before, notify, first, best), search, notify)
+            if told is not None:
+                return told
         if _wholly(best):
             best, search = likeliest_whole(
                 ideal,
@@ -110,7 +117,7 @@ def named(
             pushed = push_too(ideal, search, notify)
             if pushed is not None:
                 return pushed
-        if law is not None and not step and not before.whole:
+        if asked:
             lawful = partial(lawful_instead, ideal, before, notify, first)
             if best.mismatch.verdict != "explained":
                 told = _lawful(lawful, search, notify)

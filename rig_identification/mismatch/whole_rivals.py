@@ -97,9 +97,14 @@ def outdone(ideal: Ideal, first: Trial, traced: Explained, other: Trial, wholly:
     if twins(first.candidate, other.candidate):
         costs = [cost_in_motion(e.fitted.problem, e.fitted.evaluation, SETTLING) for e in (wholly, traced)]
         return costs[0] - costs[1] > MEANT
-    held = [held_out_densities(e.fitted) for e in (traced, wholly)]
+    return ahead_by(ideal, (first, traced), (other, wholly)) > BEATEN
+
+
+def ahead_by(ideal: Ideal, one: tuple[Trial, Explained], other: tuple[Trial, Explained]) -> float:
+    """Log evidence of whole runs by which ``one`` is ahead of ``other``, what held-out runs add included."""
+    held = [held_out_densities(found.fitted) for _, found in (one, other)]
     heard = sum(held[0][key] - held[1][key] for key in held[0].keys() & held[1].keys())
-    return _evidence(ideal, first, traced) - _evidence(ideal, other, wholly) + heard > BEATEN
+    return _evidence(ideal, *one) - _evidence(ideal, *other) + heard
 
 
 def _evidence(ideal: Ideal, trial: Trial, found: Explained) -> float:
