@@ -94,12 +94,7 @@ def named(
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
         best = whole_runs(ideal, search)
         asked = law is not None and not step and not before.whole
-        if asked and best.mismatch.verdict == "explained" and first.candidate.many:
-            # A few kilograms that swing within the body, damped well, bend to many a law of one point
-            asked = False
-            told = _lawful(partial(lawful_instead, ideal, before, notify, first, best), search, notify)
-            if told is not None:
-                return told
+        likelier = partial(lawful_instead, ideal, before, notify)
         if _wholly(best):
             best, search = likeliest_whole(
                 ideal,
@@ -109,6 +104,11 @@ def named(
                 search,
                 lambda label, at=at: notify(f"search: whole runs with {label}", at),  # type: ignore[misc]
             )
+            if asked and search.found[-1].candidate.many:
+                # A few kilograms that swing within the body, damped well, bend to many a law of one point
+                told = _lawful(partial(likelier, search.found[-1], best), search, notify)
+                if told is not None:
+                    return told
             kept = pruned(best, search, len(candidates))
             # What the first may have stood in for is taken out before anything is looked for beside it
             alone = kept is best and step + 1 < MOST_EFFECTS and not search.budget.spent()
@@ -118,9 +118,10 @@ def named(
             if pushed is not None:
                 return pushed
         if asked:
-            lawful = partial(lawful_instead, ideal, before, notify, first)
-            if best.mismatch.verdict != "explained":
-                told = _lawful(lawful, search, notify)
+            lawful = partial(likelier, first)
+            if best.mismatch.verdict != "explained" or first.candidate.many:
+                traced = best if best.mismatch.verdict == "explained" else None
+                told = _lawful(partial(lawful, traced), search, notify)
                 lawful = None
                 if told is not None:
                     return told
