@@ -106,9 +106,9 @@ def named(
             )
             if asked and search.found[-1].candidate.many:
                 # A few kilograms that swing within the body, damped well, bend to many a law of one point
-                told = _lawful(partial(likelier, search.found[-1], best), search, notify)
-                if told is not None:
-                    return told
+                ruled = _lawful(partial(likelier, search.found[-1], best), search, notify)
+                if ruled is not None:
+                    return ruled
             kept = pruned(best, search, len(candidates))
             # What the first may have stood in for is taken out before anything is looked for beside it
             alone = kept is best and step + 1 < MOST_EFFECTS and not search.budget.spent()
@@ -119,12 +119,12 @@ def named(
                 return pushed
         if asked:
             lawful = partial(likelier, first)
-            if best.mismatch.verdict != "explained" or first.candidate.many:
-                traced = best if best.mismatch.verdict == "explained" else None
-                told = _lawful(partial(lawful, traced), search, notify)
+            explained = best if best.mismatch.verdict == "explained" else None
+            if explained is None or first.candidate.many:
+                ruled = _lawful(partial(lawful, explained), search, notify)
                 lawful = None
-                if told is not None:
-                    return told
+                if ruled is not None:
+                    return ruled
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best
