@@ -109,7 +109,11 @@ def _calm_scene(scene: Scene) -> tuple[Scene, list[Trajectory]]:
 
 def _calm_run(scene: Scene, plan: Plan) -> tuple[Plan, Trajectory]:
     if plan.kind == "static":
-        return plan, _simulate_one(scene, [], plan)
+        path = _simulate_one(scene, [], plan)
+        if path.tension.min() < 0.0:
+            # The engine's rigid cables would hold a body up that lies on them: no cable does
+            raise RuntimeError(f"seed {scene.seed}, {plan.name}: at rest a cable would have to push")
+        return plan, path
     for attempt in range(12):
         engine = _released(scene, [], plan)
         # The first seconds tell most; only what passes them is run in full.

@@ -1,0 +1,75 @@
+"""A law of one point's motion where an entry of the catalogue bends to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_mismatch_whole_rivals import fit_of
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.estimate.solve import excess
+from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.lawful import lawful_instead
+from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.search import MEANT, Trials
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial
+from rig_identification.mismatch.whole_runs import whole_runs
+from rig_identification.simulate import simulate_session
+
+#: N s/m of a brake at one point.
+BRAKE = 60.0
+
+
+def searched(effects: dict[str, tuple[float, ...]]) -> tuple[Ideal, Search]:
+    spec = shaken(14, 12.0)
+    again = replace(spec.runs[0], name="run_2", holdout=True)
+    spec = replace(spec, runs=(*spec.runs, again), effects=effects, doubts=False)
+    fitted = fit_session(simulate_session(spec, np.random.default_rng(3))[0])
+    problem = with_reference(fitted.problem, fitted.rest)
+    evaluation = fitted.evaluation
+    search = Search(problem, problem, evaluation, excess(evaluation), UNLIMITED)
+    return Ideal(fitted, *judged(fitted)), search
+
+
+def told(ideal: Ideal, search: Search, label: str) -> tuple[Trial, Explained]:
+    """A hypothesis, and whole runs with it as if they were explained but for a trace."""
+    trial = fit_of(search, label)
+    own = replace(search, found=[], rivals=[])
+    own.adopt(Trials([trial]), trial)
+    found = whole_runs(ideal, own)
+    mismatch = replace(found.mismatch, verdict="explained")
+    return trial, replace(found, mismatch=mismatch, trace=True)
+
+
+@pytest.fixture(scope="module")
+def braked() -> tuple[Ideal, Search]:
+    return searched({"point_law.brake": (BRAKE, 0.0), "point_law.position": (0.2, 0.4, -0.3)})
+
+
+def test_a_brake_is_no_liquid_that_bends_to_it(braked: tuple[Ideal, Search]) -> None:
+    ideal, search = braked
+    trial, liquid = told(ideal, search, "liquid_slosh")
+    # Short pieces bend more than whole runs: what they say of the liquid is not what decides
+    found = lawful_instead(ideal, search, lambda stage, share: None, replace(trial, evidence=-np.inf), liquid)
+    assert found is not None
+    (finding,) = found.mismatch.findings
+    assert finding.effect == "unknown"
+    damping = finding.parameters["damping"]
+    assert isinstance(damping, dict)
+    assert abs(damping["value"] - BRAKE) < 4.0 * damping["std"]
+    first = found.mismatch.alternatives[0]
+    assert first["effect"] == "liquid_slosh"
+    assert float(str(first["log_likelihood_gap"])) > MEANT
+    assert len(found.bodies) == 1
+
+
+def test_no_law_goes_before_what_is_there() -> None:
+    ideal, search = searched({"hinge_damping": (3.0,)})
+    trial, damping = told(ideal, search, "hinge_damping")
+    beaten = replace(trial, evidence=-np.inf)
+    assert lawful_instead(ideal, search, lambda stage, share: None, beaten, damping) is None
