@@ -116,7 +116,8 @@ def trials(
     All get a few steps; the best few go on to their end, and where one reaches the noise only those
     that had come as close. Where much is left and no hypothesis takes it away that promised to, first order
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
-    tried whatever screening says. Beside a part on springs the ceiling that rings as it does is tried. screened: promises about this evaluation, where they are known. Where the
+    tried whatever screening says. Beside a part on springs the ceiling that rings as it does is tried.
+    screened: promises about this evaluation, where they are known. Where the
     budget is spent nothing more that changes the model is begun. more: another effect may be added after.
     law: what may explain all where nothing that first order tells of does. guess: the problem's parameters
     where the ideal model's fit began, as long as nothing else is in the model.
