@@ -6,42 +6,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_mismatch_whole_rivals import fit_of
+from test_mismatch_whole_rivals import fit_of, ideal_of, search_in, whole_with
 from test_simulate_identify import shaken
 
-from rig_identification.estimate.identify import Ideal, fit_session, judged
-from rig_identification.estimate.solve import excess
-from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.estimate.identify import Ideal
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.lawful import lawful_instead
-from rig_identification.mismatch.screen import with_reference
-from rig_identification.mismatch.search import MEANT, Trials
+from rig_identification.mismatch.search import MEANT
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial
-from rig_identification.mismatch.whole_runs import whole_runs
-from rig_identification.simulate import simulate_session
 
 #: N s/m of a brake at one point.
 BRAKE = 60.0
 
 
 def searched(effects: dict[str, tuple[float, ...]]) -> tuple[Ideal, Search]:
-    spec = shaken(14, 12.0)
-    again = replace(spec.runs[0], name="run_2", holdout=True)
-    spec = replace(spec, runs=(*spec.runs, again), effects=effects, doubts=False)
-    fitted = fit_session(simulate_session(spec, np.random.default_rng(3))[0])
-    problem = with_reference(fitted.problem, fitted.rest)
-    evaluation = fitted.evaluation
-    search = Search(problem, problem, evaluation, excess(evaluation), UNLIMITED)
-    return Ideal(fitted, *judged(fitted)), search
+    ideal = ideal_of(shaken(14, 12.0), effects, 3)
+    return ideal, search_in(ideal)
 
 
 def told(ideal: Ideal, search: Search, label: str) -> tuple[Trial, Explained]:
     """A hypothesis, and whole runs with it as if they were explained but for a trace."""
     trial = fit_of(search, label)
-    own = replace(search, found=[], rivals=[])
-    own.adopt(Trials([trial]), trial)
-    found = whole_runs(ideal, own)
+    found = whole_with(ideal, search, trial)
     mismatch = replace(found.mismatch, verdict="explained")
     return trial, replace(found, mismatch=mismatch, trace=True)
 

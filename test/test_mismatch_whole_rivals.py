@@ -12,6 +12,7 @@ from rig_identification.estimate.identify import Ideal, fit_session, judged
 from rig_identification.estimate.solve import excess
 from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import FITTED, catalogue, count_of, needed_gain, worth_a_fit
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.search import Trials
@@ -19,26 +20,42 @@ from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, among_places, attempt, finished, mass_of
 from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
 from rig_identification.mismatch.whole_runs import whole_runs
-from rig_identification.simulate import simulate_session
+from rig_identification.simulate import SessionSpec, simulate_session
 
 #: N m s/rad in every hinge; nats by which the wrong one is put ahead.
 DAMPING, AHEAD = 1.0, 2.0
 
 
+def ideal_of(spec: SessionSpec, effects: dict[str, tuple[float, ...]], seed: int) -> Ideal:
+    """The ideal model fitted to a session with effects and the same run once more, held out."""
+    again = replace(spec.runs[0], name="run_2", holdout=True)
+    spec = replace(spec, runs=(*spec.runs, again), effects=effects, doubts=False)
+    fitted = fit_session(simulate_session(spec, np.random.default_rng(seed))[0])
+    return Ideal(fitted, *judged(fitted))
+
+
+def search_in(ideal: Ideal) -> Search:
+    """A search in whole runs, with nothing found yet."""
+    problem = with_reference(ideal.fitted.problem, ideal.fitted.rest)
+    evaluation = ideal.fitted.evaluation
+    return Search(problem, problem, evaluation, excess(evaluation), UNLIMITED)
+
+
+def whole_with(ideal: Ideal, search: Search, trial: Trial) -> Explained:
+    """Whole runs with a hypothesis."""
+    own = replace(search, found=[], rivals=[])
+    own.adopt(Trials([trial]), trial)
+    return whole_runs(ideal, own)
+
+
 @pytest.fixture(scope="module")
 def ideal() -> Ideal:
-    spec = shaken(10, 10.0)
-    again = replace(spec.runs[0], name="run_2", holdout=True)
-    spec = replace(spec, runs=(*spec.runs, again), effects={"hinge_damping": (DAMPING,)}, doubts=False)
-    fitted = fit_session(simulate_session(spec, np.random.default_rng(5))[0])
-    return Ideal(fitted, *judged(fitted))
+    return ideal_of(shaken(10, 10.0), {"hinge_damping": (DAMPING,)}, 5)
 
 
 @pytest.fixture(scope="module")
 def search(ideal: Ideal) -> Search:
-    problem = with_reference(ideal.fitted.problem, ideal.fitted.rest)
-    evaluation = ideal.fitted.evaluation
-    return Search(problem, problem, evaluation, excess(evaluation), UNLIMITED)
+    return search_in(ideal)
 
 
 def fit_of(search: Search, label: str) -> Trial:
@@ -90,9 +107,7 @@ def test_what_leaves_a_trace_is_kept_where_what_leaves_none_is_far_less_likely(
     found = []
     for label in ("hinge_damping", "air_drag"):
         trial = fit_of(search, label)
-        own = replace(search, found=[], rivals=[])
-        own.adopt(Trials([trial]), trial)
-        found.append((trial, whole_runs(ideal, own)))
+        found.append((trial, whole_with(ideal, search, trial)))
     (damping, with_damping), (drag, with_drag) = found
     assert outdone(ideal, damping, with_damping, drag, with_drag)
     assert not outdone(ideal, drag, with_drag, damping, with_damping)

@@ -72,25 +72,21 @@ def lawful(
     best = whole_runs(ideal, own)
     if best.mismatch.verdict != "explained":
         return None
-    told = replace(
-        best.mismatch, findings=(law_finding(best.fitted, trial.candidate, best.mismatch.findings[0]),)
-    )
-    if instead is None:
+    if best.trace and (instead is None or not instead[1].trace):
         # A name of the catalogue may leave a trace; what has no name has nothing else to speak for it
-        return None if best.trace else replace(best, mismatch=told)
-    name, named = instead
-    if best.trace and not named.trace:
         return None
-    gap = ahead_by(ideal, (trial, best), instead)
-    if gap < (MEANT if best.trace or not named.trace else -BEATEN):
-        # As of two names, what explains it all goes before what leaves a trace unless it is outdone
-        return None
-    fitted = as_fitted(named.fitted, name)
-    return replace(
-        best,
-        mismatch=replace(told, alternatives=(rival(fitted, gap), *told.alternatives)),
-        bodies=(*best.bodies, (gap, inertial_estimate(fitted.problem, fitted.evaluation))),
-    )
+    mismatch, bodies = best.mismatch, best.bodies
+    if instead is not None:
+        name, named = instead
+        gap = ahead_by(ideal, (trial, best), instead)
+        if gap < (MEANT if best.trace or not named.trace else -BEATEN):
+            # As of two names, what explains it all goes before what leaves a trace unless it is outdone
+            return None
+        fitted = as_fitted(named.fitted, name)
+        mismatch = replace(mismatch, alternatives=(rival(fitted, gap), *mismatch.alternatives))
+        bodies = (*bodies, (gap, inertial_estimate(fitted.problem, fitted.evaluation)))
+    finding = law_finding(best.fitted, trial.candidate, mismatch.findings[0])
+    return replace(best, mismatch=replace(mismatch, findings=(finding,)), bodies=bodies)
 
 
 def law_of_pieces(ideal: Ideal, search: Search, notify: Notify) -> Law:

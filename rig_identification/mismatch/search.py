@@ -117,10 +117,10 @@ def trials(
     that had come as close. Where much is left and no hypothesis takes it away that promised to, first order
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
     tried whatever screening says. Beside a part on springs the ceiling that rings as it does is tried.
-    screened: promises about this evaluation, where they are known. Where the
-    budget is spent nothing more that changes the model is begun. more: another effect may be added after.
-    law: what may explain all where nothing that first order tells of does. guess: the problem's parameters
-    where the ideal model's fit began, as long as nothing else is in the model.
+    Where the budget is spent nothing more that changes the model is begun. screened: promises about this
+    evaluation, where they are known. more: another effect may be added after. law: what may explain all
+    where nothing that first order tells of does. guess: the problem's parameters where the ideal model's
+    fit began, as long as nothing else is in the model.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
