@@ -24,6 +24,7 @@ from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided_beside
 from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
+from rig_identification.mismatch.without_first import without_first
 
 Notify = Callable[[str, float], None]
 #: What explains a session outside a push that shows in short pieces as they are fitted; None: no push does.
@@ -42,6 +43,7 @@ def named(
     fallback: Explained | None = None
     uneven: tuple[Problem, Evaluation] | None = None  # pieces with an effect in that lack more
     led = False  # what is in the model waits for another one
+    origin = search.forked()
     lawful: Callable[[], Explained | None] | None = None  # what tells whether a law explains it all instead
     for step in range(MOST_EFFECTS):
         if step and search.budget.spent():
@@ -66,6 +68,12 @@ def named(
         search.liar = search.liar or tried.liar
         if not tried.done:
             break
+        if step:
+            if search.whole:
+                origin = replace(origin, here=search.problem, evaluation=ideal.fitted.evaluation)
+            single = without_first(origin, search, tried, count_of(candidates))
+            if single is not None:
+                search, tried = replace(origin.forked(), liar=search.liar), single
         before = search.forked()
         first = tried.done[0]
         if not search.whole and not tried.chief:

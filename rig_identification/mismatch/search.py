@@ -36,6 +36,7 @@ from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
+from rig_identification.mismatch.same_clock import contradicted
 from rig_identification.mismatch.screen import Promise, carried, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
@@ -297,7 +298,8 @@ class _Look:
         """Trials, likeliest first, with the lag beside every late clock: to first order they are alike.
 
         A clock that leaves only noise keeps its lag from being tried, and with one more effect it may leave
-        as little as the lag by itself.
+        as little as the lag by itself. A clock that its stamps contradict is told only where nothing else
+        is about as likely.
         """
         out = list(done)
         for clock in done:
@@ -309,6 +311,8 @@ class _Look:
             twin = None if begun is None else finished(begun, self.budget)
             if twin is not None and twin.evidence > self.needed:
                 out.append(twin)
+        likely = max((t.evidence for t in out if not contradicted(t)), default=-np.inf)
+        out = [t for t in out if t.evidence - likely > BEATEN or not contradicted(t)]
         return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
 
     def without_devices(self) -> None:
