@@ -70,7 +70,9 @@ def test_a_slower_device_lies_on_the_faster_ones_grid() -> None:
     assert shared_interval(drifting, "cable_2") is None
 
 
-@pytest.mark.parametrize(("late", "off"), [(0.0131, True), (-0.0049, True), (0.01202, False), (-0.004, False)])
+@pytest.mark.parametrize(
+    ("late", "off"), [(0.0131, True), (-0.0049, True), (0.01202, False), (-0.004, False)]
+)
 def test_a_clock_is_off_by_whole_intervals_or_by_none(together: Recording, late: float, off: bool) -> None:
     assert contradicted(_late(together, "cable_1", late, 1e-4)) is off
     # Known no better than an interval it may be any number of them
