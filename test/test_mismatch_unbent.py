@@ -9,11 +9,14 @@ import pytest
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.mismatch.amounts import stretching
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.trial import VERY_FAR, attempt, mass_of
 from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, unbent
 from rig_identification.simulate import simulate_session
 
@@ -47,11 +50,14 @@ def test_the_better_of_two_starts_is_kept(fitted: Fitted) -> None:
     assert first.cost > fitted.evaluation.cost
     gain = next(c for c in catalogue(fitted.problem) if c.effect == "load_cell_gain")
     starts = [first, fitted.evaluation]
-    best = best_of(fitted.problem, starts, Promise(gain, 1.0, {}), UNLIMITED)
-    alone = best_of(fitted.problem, starts[:1], Promise(gain, 1.0, {}), UNLIMITED)
+    best, _ = best_of(fitted.problem, starts, Promise(gain, 1.0, {}), UNLIMITED)
+    alone, same = best_of(fitted.problem, starts[:1], Promise(gain, 1.0, {}), UNLIMITED)
     assert best is not None
     assert alone is not None
     assert best.evidence >= alone.evidence
+    # One start says nothing of another one; two of the same do
+    assert not same
+    assert best_of(fitted.problem, starts[1:] * 2, Promise(gain, 1.0, {}), UNLIMITED)[1]
 
 
 def test_screenings_are_tried_in_turn_and_slow_fits_are_not(fitted: Fitted) -> None:
@@ -62,3 +68,16 @@ def test_screenings_are_tried_in_turn_and_slow_fits_are_not(fitted: Fitted) -> N
     assert tried[:4] == ["load_cell_gain", "level_error", "load_cell_gain", "level_error"]
     assert "tether" not in tried
     assert len(tried) <= 2 * MOST
+
+
+def test_what_rings_is_given_up_where_the_first_second_shows_much_more_than_it_explains() -> None:
+    """A cell that reads a fifth too much is off from the first sample on, whatever the cables' stiffness."""
+    spec = shaken(14, 6.0)
+    name = f"{spec.rig.cables[0].name}.load_cell_gain"
+    session = simulate_session(replace(spec, effects={name: (0.2,)}), np.random.default_rng(8))[0]
+    found = fit_session(session, lambda stage, share: None, None)
+    problem = with_reference(found.problem, found.rest)
+    assert misfit(found.evaluation) > VERY_FAR
+    stretched = stretching(problem, found.evaluation, mass_of(problem, found.evaluation))
+    assert stretched is not None
+    assert attempt(problem, found.evaluation, stretched) is None

@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit, settled_starts
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, shortened
+from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.riders import Swing, rider_candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
@@ -115,21 +116,28 @@ class Amount:
         return Promise(self.candidate, max(0.0, gain), {self.name: amount}, max(0.0, gain) / left)
 
 
-def supports(problem: Problem, evaluation: Evaluation, mass: float) -> list[Promise]:
-    """What gives way, each scanned over its amount; nothing where the model gives way already."""
+def supports(
+    problem: Problem, evaluation: Evaluation, mass: float, budget: Budget = UNLIMITED
+) -> list[Promise]:
+    """What gives way, each scanned over its amount; nothing where the model gives way already.
+
+    What comes after the ``budget`` is spent is not scanned.
+    """
     rig, model = problem.bench.rig, problem.bench.parameters.model
-    if gives_way(model):
+    if gives_way(model) or budget.spent():
         return []
     spaced = _spacing(evaluation)
     found = [_stretching(problem, evaluation, mass)]
     sinks = list(largest_compliance(rig, mass) * _spread(SINKS, spaced))
     for axis, a in enumerate(AXES):
+        if budget.spent():
+            break
         ceilings = [ceiling_candidate(rig, model, mass, axis, frequency=f) for f in CEILING_FREQUENCIES]
         tried = [Amount(problem, evaluation, c, f"ceiling.compliance.{a}") for c in ceilings]
         found.append(max(((t, t.best(sinks)) for t in tried), key=lambda t: t[1].gain))
     out = [promise for _, promise in found]
     first = int(np.argmax([promise.gain for promise in out]))
-    if out[first].gain > 0.0:
+    if out[first].gain > 0.0 and not budget.spent():
         out[first] = found[first][0].refined(out[first], spaced)
     return out
 
@@ -209,12 +217,16 @@ def ringing_like(problem: Problem, tried: list[Trial], before: Evaluation, mass:
 
 
 def far_promises(
-    problem: Problem, evaluation: Evaluation, promises: list[Promise], mass: float
+    problem: Problem,
+    evaluation: Evaluation,
+    promises: list[Promise],
+    mass: float,
+    budget: Budget = UNLIMITED,
 ) -> list[Promise]:
     """What gives way, and the best rider to one side and to all, whatever screening promises of them."""
     if gives_way(problem.bench.parameters.model):
         return []
-    out = [p for p in supports(problem, evaluation, mass) if p.share > WORTH]
+    out = [p for p in supports(problem, evaluation, mass, budget) if p.share > WORTH]
     out += brakes(problem, evaluation, promises)
     riders = [p for p in promises if p.candidate.effect in ("liquid_slosh", "sprung_mass")]
     out += riders[:1]

@@ -19,7 +19,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, worth_a_fit
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
-from rig_identification.mismatch.trial import Trial, attempt, finished
+from rig_identification.mismatch.trial import VERY_FAR, Trial, attempt, finished
 
 Notify = Callable[[str], None]
 
@@ -29,8 +29,6 @@ DIRECT = 0.8
 #: a hypothesis may have left after its first steps to be its rival even so.
 AT_NOISE = 1.05
 RIVAL = 10.0
-#: Mean square of the residuals above which so much is left that what leaves nothing of it is no chance.
-VERY_FAR = 5.0
 #: Share of what was left up to which a hypothesis, after its first steps, is fitted to its end at once.
 ALMOST = 0.15
 #: Hypotheses that are tried on top of another one, which leaves something.

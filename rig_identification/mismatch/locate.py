@@ -13,6 +13,7 @@ import numpy as np
 
 from rig_identification.estimate.growing import misfit, settled_starts
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, excess, solve
+from rig_identification.mismatch.budget import UNLIMITED, Budget
 
 #: Factor on a device's noise that silences it, and on the exciter's.
 SILENT = 300.0
@@ -86,13 +87,18 @@ def _gone_with(problem: Problem, evaluation: Evaluation, device: str) -> float:
     return 1.0 - max(0.0, left - won) / max(excess(evaluation), 1.0)
 
 
-def find_liar(problem: Problem, evaluation: Evaluation) -> Liar | None:
-    """The device without which the others agree best, where nearly all excess goes with it."""
+def find_liar(problem: Problem, evaluation: Evaluation, budget: Budget = UNLIMITED) -> Liar | None:
+    """The device without which the others agree best, where nearly all excess goes with it.
+
+    No further one is silenced once the ``budget`` is spent.
+    """
     devices = devices_of(problem)
     if len(devices) < 3:
         return None
     best: Liar | None = None
     for device in devices:
+        if budget.spent():
+            break
         # The force is no row, it drives everything: only a fit tells
         if device != "exciter" and _gone_with(problem, evaluation, device) < GONE_LINEARLY:
             continue

@@ -25,7 +25,6 @@ from rig_identification.mismatch.first_fits import (
     CLOSE,
     DIRECT,
     RIVAL,
-    VERY_FAR,
     Notify,
     at_noise,
     begun,
@@ -41,9 +40,11 @@ from rig_identification.mismatch.screen import Promise, carried, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
     FIRST_STEPS,
+    VERY_FAR,
     Trial,
     among_places,
     amount_seen,
+    as_it_stands,
     attempt,
     beyond_doubt,
     earned_evidence,
@@ -183,6 +184,7 @@ class _Look:
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
+    hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
     @property
@@ -217,7 +219,7 @@ class _Look:
 
     def untried(self, promises: list[Promise]) -> list[Promise]:
         """Promises of what has not been tried."""
-        known = {t.candidate.label for t in self.tried}
+        known = {t.candidate.label for t in self.tried} | self.hopeless
         return [p for p in promises if p.candidate.label not in known]
 
     def directly(self) -> None:
@@ -247,6 +249,7 @@ class _Look:
         stretched = stretching(self.here, self.seen, self.mass)
         promised += [] if stretched is None or stretched.share < DIRECT else [stretched]
         self.begin(promised)
+        self.hopeless = {p.candidate.label for p in self.untried(promised)} if not self.at_noise else set()
 
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
@@ -255,16 +258,19 @@ class _Look:
         first = None if guess is None else at_first(self.here, self.seen, guess)
         starts = [e for e in (about, first) if e is not None]
         again = [] if about is None else screen(self.here, about, self.candidates, self.mass)
+        known: set[str] = set()
         for promise in likely(self.promises, again):
+            label = promise.candidate.label
             if self.budget.spent() or self.at_noise:
                 break
-            if any(t.candidate.label == promise.candidate.label and self._decided(t) for t in self.tried):
+            if label in known or any(t.candidate.label == label and self._decided(t) for t in self.tried):
                 continue
-            self.notify(promise.candidate.label)
-            trial = best_of(self.here, starts, promise, self.budget)
-            if trial is None:
-                continue
-            self.tried.append(trial)
+            self.notify(label)
+            trial, alike = best_of(self.here, starts, promise, self.budget)
+            if trial is not None:
+                self.tried.append(trial)
+            if alike:
+                known.add(label)
 
     def _decided(self, trial: Trial) -> bool:
         """Whether starting a hypothesis from what the other screening promised of it is of no use."""
@@ -321,7 +327,7 @@ class _Look:
             # With something that swings in the model such fits take minutes
             return
         self.notify("without each device in turn")
-        liar = find_liar(self.problem, self.evaluation)
+        liar = find_liar(self.problem, self.evaluation, self.budget)
         if liar is None:
             return
         # About the fit that does not hear it, what is wrong with it shows as it is
@@ -333,7 +339,7 @@ class _Look:
     def giving_way(self) -> None:
         """What gives way, whatever screening says of it, and all else; the law where that explains it."""
         self.notify("what gives way")
-        worthy = self.untried(far_promises(self.here, self.seen, self.promises, self.mass))
+        worthy = self.untried(far_promises(self.here, self.seen, self.promises, self.mass, self.budget))
         known = {p.candidate.label for p in worthy}
         others = self.untried(worth_a_fit(self.promises, self.count))
         worthy += [p for p in others if p.candidate.label not in known]
@@ -343,7 +349,7 @@ class _Look:
     def yielding_a_little(self) -> None:
         """Near the noise: what gives way, of which first order says nothing where it rings."""
         self.notify("what gives way")
-        worthy = self.untried(supports(self.here, self.seen, self.mass))
+        worthy = self.untried(supports(self.here, self.seen, self.mass, self.budget))
         self.begin(worth_a_fit(sorted(worthy, key=lambda p: -p.gain), self.count))
 
     def passed_over(self) -> bool:
@@ -383,6 +389,11 @@ class _Look:
             return False
         return trial.evidence > log_evidence(without) + MEANT
 
+    def _rivals(self, trial: Trial, best: Trial) -> bool:
+        """Whether a trial may yet come near the noise, as ``best`` does."""
+        left = excess(trial.evaluation)
+        return trial.candidate.label != best.candidate.label and left < CHIEF * excess(self.seen)
+
     def ended(self, limit: float) -> Trials:
         """The likeliest of what was tried, fitted to its end. limit: of ordinary errors, in tolerances."""
         if not self.tried:
@@ -396,9 +407,12 @@ class _Look:
             if len(done) == FINISHED or ((last or (done and self.budget.spent())) and not trial.settled):
                 continue
             self.notify(trial.candidate.label)
+            # Where nothing comes near it whole runs take it to its end
+            lone = self.far and at_noise(trial) and trial.candidate.closer is None
+            lone = lone and not any(self._rivals(t, trial) for t in self.tried)
             # What is beaten is stated as it is: a closer description of it takes half a minute
             plain = replace(trial, candidate=replace(trial.candidate, closer=None)) if last else trial
-            ended = finished(plain, self.budget)
+            ended = as_it_stands(plain) if lone else finished(plain, self.budget)
             if ended is None or not beyond_doubt(ended, ordinary, limit):
                 continue
             if not self.far and not amount_seen(ended) and not self._missed(ended):

@@ -48,6 +48,9 @@ KEPT = 0.5
 HELD = 0.05
 #: Ends (s) of the first horizons over which a changed model is fitted.
 HORIZONS = (0.4, 1.2)
+#: Mean square of the residuals above which so much is left that what leaves nothing of it is no chance, and
+#: the share of it that is still left over the first horizons by what rings or swings and is not there.
+VERY_FAR, LARGER = 5.0, 0.5
 #: Std of its prior that a fit starts away from at most.
 FARTHEST = 3.0
 
@@ -140,7 +143,11 @@ def attempt(
     point = promised(wide, begun, candidate, promise.values, evaluation)
     try:
         if candidate.build is not None:
-            point = _grown(wide, candidate, point, misfit(evaluation) > NEAR_SQUARE, stop)
+            far = misfit(evaluation) > NEAR_SQUARE
+            point, left = _grown(wide, candidate, point, far, stop)
+            if left > VERY_FAR and left > LARGER * _over_first(problem, evaluation):
+                # What the first second shows so much of, and the changed model hardly any, is something else
+                return None
             fitted, settled = _first_steps(wide, point, CHANGED_STEPS, stop)
         else:
             fitted, settled = _from_promise(
@@ -209,16 +216,21 @@ def promised(
     return point if candidate.settle is None else candidate.settle(problem, point, evaluation)
 
 
-def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool, stop: Stop) -> Point:
+def _grown(
+    problem: Problem, candidate: Candidate, point: Point, far: bool, stop: Stop
+) -> tuple[Point, float]:
     """The point from where a fit of a changed model to all of its runs starts.
 
     A changed model throws the start states out first, and its amount comes before its other ratios. Where
     much is left (far) it is fitted over the first instants before: what stretches or yields rings at tens of
     hertz, over some seconds a stiffness a percent off is half a turn out of step, and everything else bends
     to that (growing.py). Near the noise first order is about right, and short horizons tell nothing.
+
+    Also returns the mean square that is left over the last of these horizons; 0 near the noise.
     """
     if not far:
-        return _with_amount(problem, candidate, replace(point, starts=settled_starts(problem, point)))
+        return _with_amount(problem, candidate, replace(point, starts=settled_starts(problem, point))), 0.0
+    left = 0.0
     for end in HORIZONS:
         part = held_over(problem, end, point.theta[:INERTIAL].copy())
         point = replace(point, starts=settled_starts(part, point))
@@ -227,8 +239,16 @@ def _grown(problem: Problem, candidate: Candidate, point: Point, far: bool, stop
         fitted, _ = solve(
             part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, bends=True, stop=stop
         )
-        point = fitted.point
-    return replace(point, starts=settled_starts(problem, point))
+        point, left = fitted.point, misfit(fitted)
+    return replace(point, starts=settled_starts(problem, point)), left
+
+
+def _over_first(problem: Problem, evaluation: Evaluation) -> float:
+    """Mean square that a fit leaves over the last of the first horizons, each start at its best."""
+    point = evaluation.point
+    part = held_over(problem, HORIZONS[-1], point.theta[:INERTIAL].copy())
+    there = evaluate(part, replace(point, starts=settled_starts(part, point)), residuals_only=True)
+    return np.inf if there is None else misfit(there)
 
 
 def _with_amount(problem: Problem, candidate: Candidate, point: Point) -> Point:
@@ -277,6 +297,11 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
         return trial
     closest = _closest(trial, stop)
     return replace(closest, candidate=replace(closest.candidate, closer=None))
+
+
+def as_it_stands(trial: Trial) -> Trial | None:
+    """The trial where its first steps led; None where its sign makes no sense."""
+    return trial if _sensible(trial) else None
 
 
 def _closest(trial: Trial, stop: Stop) -> Trial:

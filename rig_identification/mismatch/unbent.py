@@ -18,13 +18,15 @@ from numpy.typing import NDArray
 from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial, attempt
 
 #: Promises that are tried, of each screening.
 MOST = 4
+#: Share of what is left by which fits from two starts differ at most where a third one finds nothing new.
+ALIKE = 0.05
 
 
 def unbent(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
@@ -51,7 +53,12 @@ def likely(*screened: list[Promise]) -> list[Promise]:
     return [p for turn in zip_longest(*soon) for p in turn if p is not None]
 
 
-def best_of(problem: Problem, starts: list[Evaluation], promise: Promise, budget: Budget) -> Trial | None:
-    """The likelier first fit of a promise from either start."""
+def best_of(
+    problem: Problem, starts: list[Evaluation], promise: Promise, budget: Budget
+) -> tuple[Trial | None, bool]:
+    """The likelier first fit of a promise from either start, and whether all of them come to the same."""
     tried = [attempt(problem, start, promise, budget) for start in starts]
-    return max((t for t in tried if t is not None), key=lambda t: t.evidence, default=None)
+    fits = [t for t in tried if t is not None]
+    left = [excess(t.evaluation) for t in fits]
+    alike = len(fits) > 1 and len(fits) == len(tried) and max(left) <= (1.0 + ALIKE) * min(left)
+    return max(fits, key=lambda t: t.evidence, default=None), alike
