@@ -13,7 +13,7 @@ from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session, judged
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import weighed_otherwise
-from rig_identification.mismatch.amounts import SPACED, Amount, ringing_like
+from rig_identification.mismatch.amounts import SPACED, Amount, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.first_fits import begun
 from rig_identification.mismatch.hypotheses import catalogue
@@ -66,6 +66,7 @@ def test_a_spent_budget_begins_nothing_that_changes_the_model(
     ]
     tried = begun(problem, evaluation, promises, True, lambda stage: None, Budget(seconds=-1.0))
     assert [t.candidate.effect for t in tried] == ["load_cell_gain"]
+    assert supports(problem, evaluation, mass, Budget(seconds=-1.0)) == []
 
 
 def test_a_promise_too_far_off_is_walked_to(inextensible: tuple[Problem, Evaluation]) -> None:
