@@ -36,9 +36,7 @@ def _recording(cells: dict[str, Series], imu: Series | None = None) -> Recording
 def _late(recording: Recording, channel: str, late: float, std: float, effect: str = "clock_offset"):  # type: ignore[no-untyped-def]
     """The least that a trial of a late clock holds: its value, and how well it is known (s)."""
     own = Parameter(f"{channel}.clock", "s", 0.0, 0.05, "device", 0)
-    parameters = SimpleNamespace(
-        free=(own,), named=lambda theta: {own.name: late}, index_of=lambda name: INERTIAL
-    )
+    parameters = SimpleNamespace(free=(own,), values=lambda theta: np.array([late]))
     information = np.eye(INERTIAL + 1)
     information[INERTIAL, INERTIAL] = (own.prior_std / std) ** 2
     return SimpleNamespace(
@@ -46,7 +44,9 @@ def _late(recording: Recording, channel: str, late: float, std: float, effect: s
         problem=SimpleNamespace(
             runs=(SimpleNamespace(recording=recording),), bench=SimpleNamespace(parameters=parameters)
         ),
-        evaluation=SimpleNamespace(point=SimpleNamespace(theta=None), information=information),
+        evaluation=SimpleNamespace(
+            point=SimpleNamespace(theta=np.zeros(INERTIAL + 1)), information=information
+        ),
     )
 
 

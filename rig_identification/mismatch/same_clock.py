@@ -14,7 +14,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.mismatch.trial import Trial, std_of
+from rig_identification.estimate.identify import parameter_estimates
+from rig_identification.mismatch.trial import Trial
 from rig_identification.recording import Recording
 
 Array = NDArray[np.float64]
@@ -31,14 +32,15 @@ def contradicted(clock: Trial) -> bool:
     if clock.candidate.effect != "clock_offset":
         return False
     (own,) = clock.candidate.parameters
-    late = clock.problem.bench.parameters.named(clock.evaluation.point.theta)[own.name]
+    late = next(p for p in parameter_estimates(clock.problem, clock.evaluation) if p.name == own.name)
     recordings = {id(run.recording): run.recording for run in clock.problem.runs}.values()
     intervals = [shared_interval(r, str(clock.candidate.where["channel"])) for r in recordings]
     known = [interval for interval in intervals if interval is not None]
     if len(known) < len(intervals):
         return False
-    farthest = OFF * std_of(clock, own)
-    return all(abs(late - interval * round(late / interval)) > farthest for interval in known)
+    return all(
+        abs(late.value - interval * round(late.value / interval)) > OFF * late.std for interval in known
+    )
 
 
 def shared_interval(recording: Recording, device: str) -> float | None:

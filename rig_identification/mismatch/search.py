@@ -317,8 +317,9 @@ class _Look:
             twin = None if begun is None else finished(begun, self.budget)
             if twin is not None and twin.evidence > self.needed:
                 out.append(twin)
-        likely = max((t.evidence for t in out if not contradicted(t)), default=-np.inf)
-        out = [t for t in out if t.evidence - likely > BEATEN or not contradicted(t)]
+        heard = [(t, contradicted(t)) for t in out]
+        likely = max((t.evidence for t, impossible in heard if not impossible), default=-np.inf)
+        out = [t for t, impossible in heard if not impossible or t.evidence - likely > BEATEN]
         return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
 
     def without_devices(self) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.observability import invert_information
+from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
@@ -167,14 +167,11 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
     let_go = stiffness * float(np.max(np.abs(moved)))
     # A pull that never comes off is where the fit of the spring stands, and leads nowhere
     pulls = {1.0: 0.5 * let_go, -1.0: -0.5 * let_go}
-    pull = next((q for q in parameters.free if q.name == f"tether.pull.{axis}"), None)
-    if pull is not None:
-        column = parameters.index_of(pull.name)
-        std = pull.prior_std * float(np.sqrt(invert_information(evaluation.information)[column, column]))
-        fitted = pull.value(theta[column])
-        if abs(fitted) - CERTAIN * std > let_go:
-            # Taut all the time: it only turns with the body
-            pulls = {float(np.sign(fitted)): fitted}
+    estimates = parameter_estimates(problem, evaluation)
+    pull = next((p for p in estimates if p.name == f"tether.pull.{axis}"), None)
+    if pull is not None and abs(pull.value) - CERTAIN * pull.std > let_go:
+        # Taut all the time: it only turns with the body
+        pulls = {float(np.sign(pull.value)): pull.value}
     known = {f"tether.stiffness.{axis}": stiffness} | {
         f"tether.point.{a}": float(value) for a, value in zip(AXES, at, strict=True)
     }

@@ -18,7 +18,7 @@ from rig_identification.estimate.growing import (
 )
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import invert_information
-from rig_identification.estimate.parameters import INERTIAL, Parameter
+from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, model_at
 from rig_identification.estimate.solve import HOPELESS, POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
@@ -365,14 +365,6 @@ def in_stds(trial: Trial) -> dict[str, float]:
     theta, free = trial.evaluation.point.theta, trial.problem.bench.parameters.free
     std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))[: theta.size]
     return {p.name: float(z) for p, z in zip(free, (theta / std)[INERTIAL:], strict=True)}
-
-
-def std_of(trial: Trial, parameter: Parameter) -> float:
-    """Standard deviation of one of a trial's parameters, in its own unit, about where its fit stands."""
-    parameters = trial.problem.bench.parameters
-    i = parameters.index_of(parameter.name)
-    free = parameters.free[i - INERTIAL]
-    return float(free.prior_std * np.sqrt(invert_information(trial.evaluation.information)[i, i]))
 
 
 def ordinary_errors(problem: Problem) -> dict[str, float]:

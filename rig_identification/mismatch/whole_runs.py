@@ -63,17 +63,20 @@ def as_fitted(fitted: Fitted, trial: Trial) -> Trial:
     return replace(trial, problem=fitted.problem, evaluation=fitted.evaluation)
 
 
+def firmness(trial: Trial, ordinary: dict[str, float], count: int) -> float:
+    """Gain of a trial's effect, in parts of what chance gives one of ``count``; 0 within what is ordinary."""
+    if not beyond_doubt(trial, ordinary, ORDINARY):
+        return 0.0
+    return strength(trial) / needed_gain(trial.candidate, count)
+
+
 def pruned(best: Explained, search: Search, count: int) -> Explained:
     """The explanation less what it can do without: an early effect may only have stood in for a later one."""
     kept = list(search.found)
     ordinary = ordinary_errors(search.problem)
     while len(kept) > 1:
         fitted = best.fitted
-        here = [as_fitted(fitted, t) for t in kept]
-        strengths = [
-            strength(t) / needed_gain(t.candidate, count) if beyond_doubt(t, ordinary, ORDINARY) else 0.0
-            for t in here
-        ]
+        strengths = [firmness(as_fitted(fitted, t), ordinary, count) for t in kept]
         for i in np.argsort(strengths):
             if strengths[i] > FIRM:
                 return best

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rig_identification.estimate.identify import ORDINARY
 from rig_identification.estimate.solve import POLISH, solve
 from rig_identification.mismatch.first_fits import BEATEN, at_noise
-from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.search import MEANT, Trials
 from rig_identification.mismatch.standing import Search
@@ -21,12 +19,10 @@ from rig_identification.mismatch.trial import (
     LAST_STEPS,
     Trial,
     among_places,
-    beyond_doubt,
     log_evidence,
     ordinary_errors,
-    strength,
 )
-from rig_identification.mismatch.whole_runs import FIRM
+from rig_identification.mismatch.whole_runs import FIRM, firmness
 
 
 def without_first(origin: Search, search: Search, tried: Trials, count: int) -> Trials | None:
@@ -42,20 +38,13 @@ def without_first(origin: Search, search: Search, tried: Trials, count: int) -> 
     for trial in tried.done:
         if first.evidence - trial.evidence > BEATEN or not at_noise(trial):
             continue
-        if any(_firm(t, trial, ordinary, count) for t in search.found):
+        beside = [replace(t, problem=trial.problem, evaluation=trial.evaluation) for t in search.found]
+        if any(firmness(t, ordinary, count) > FIRM for t in beside):
             continue
         single = _by_itself(origin, trial)
         if single is not None and log_evidence(trial.evaluation) < single.evidence + MEANT:
             done.append(among_places(single))
     return Trials(sorted(done, key=lambda t: -t.evidence)) if done else None
-
-
-def _firm(found: Trial, beside: Trial, ordinary: dict[str, float], count: int) -> bool:
-    """Whether what was found first is plain in a fit with both."""
-    there = replace(found, problem=beside.problem, evaluation=beside.evaluation)
-    if not beyond_doubt(there, ordinary, ORDINARY):
-        return False
-    return strength(there) > FIRM * needed_gain(found.candidate, count)
 
 
 def _by_itself(origin: Search, trial: Trial) -> Trial | None:
