@@ -304,14 +304,22 @@ class Diagnostics:
         return name in self.lines and words in self.lines[name].message
 
     def arrivals(self, node: str, count: int, *topics: str) -> Callable[[], bool]:
-        """Whether ``count`` messages more than now have reached a node on each topic, by its own account."""
-        lines = [f"{node}: /rig/{topic}" for topic in topics]
+        """Whether ``count`` messages more than now have reached a node on each topic, by its own account.
 
-        def received(line: str) -> int:
-            return int(self.value(line, "received") or 0)
+        Now: the first line that comes after this call. One heard before tells of a second ago, and none
+        heard yet of nothing, while the node may have listened for long.
+        """
+        names = [f"{node}: /rig/{topic}" for topic in topics]
+        old = {name: self.lines.get(name) for name in names}
+        first: dict[str, int] = {}
 
-        before = [received(line) for line in lines]
-        return lambda: all(received(line) >= first + count for line, first in zip(lines, before, strict=True))
+        def arrived(name: str) -> bool:
+            if self.lines.get(name) is old[name]:
+                return False
+            received = int(self.value(name, "received") or 0)
+            return received >= first.setdefault(name, received) + count
+
+        return lambda: all([arrived(name) for name in names])
 
 
 @pytest.fixture(name="graph")

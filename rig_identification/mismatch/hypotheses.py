@@ -46,12 +46,22 @@ def catalogue(problem: Problem) -> list[Candidate]:
 
 
 def compatible(candidates: list[Candidate], found: list[Candidate]) -> list[Candidate]:
-    """Candidates that can stand beside what was found: no parameter of theirs is in the model already.
+    """Candidates that can stand beside what was found: they write no number that is in the model already.
 
-    A second hose would write its numbers over the first one's.
+    A second hose would write its numbers over the first one's, and the lag of all cells over one cell's.
     """
-    taken = {q.name for c in found for q in c.parameters}
-    return [c for c in candidates if not taken & {q.name for q in c.parameters}]
+    names = {q.name for c in found for q in c.parameters}
+    entries = {entry for c in found for entry in _written(c)}
+    return [
+        c for c in candidates if not names & {q.name for q in c.parameters} and not entries & _written(c)
+    ]
+
+
+def _written(candidate: Candidate) -> set[tuple[str, int]]:
+    """Entries of the model or a device that a candidate writes; one that builds has its own."""
+    if candidate.build is not None:
+        return set()
+    return {(q.kind, entry) for q in candidate.parameters for entry in (q.index, *q.also)}
 
 
 def count_of(candidates: list[Candidate]) -> int:
