@@ -319,7 +319,7 @@ class Diagnostics:
             received = int(self.value(name, "received") or 0)
             return received >= first.setdefault(name, received) + count
 
-        return lambda: all([arrived(name) for name in names])
+        return lambda: all(arrived(name) for name in names)
 
 
 @pytest.fixture(name="graph")
