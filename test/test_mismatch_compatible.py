@@ -50,7 +50,5 @@ def test_the_lag_of_all_cells_is_not_asked_beside_one_cells(problem: Problem) ->
         next(c for c in candidates if c.label == label) for label in ("sensor_lag", "sensor_lag cable_4")
     )
     assert every.label not in _labels(compatible(candidates, [one]))
-    assert _labels(compatible(candidates, [every])).isdisjoint(
-        f"sensor_lag cable_{i}" for i in (1, 2, 3, 4)
-    )
+    assert _labels(compatible(candidates, [every])).isdisjoint(f"sensor_lag cable_{i}" for i in (1, 2, 3, 4))
     assert {"sensor_lag imu", "sensor_lag cable_1", "air_drag"} <= _labels(compatible(candidates, [one]))

@@ -16,7 +16,7 @@ from session_samples import edit_yaml, make_recording, rewrite, shift_stamp, sta
 
 from rig_identification.recording import ChannelQuality, Recording, Series
 from rig_identification.session import read_session
-from rig_identification.session.clipping import clipped_samples
+from rig_identification.session.clipping import clipped_samples, limits
 from rig_identification.session.stamps import select_stamps
 
 IMU = "/rig/imu/data_raw"
@@ -172,7 +172,10 @@ def test_clipped_values(tmp_path: Path) -> None:
     recording = dataclasses.replace(written, tension={**written.tension, "cable_1": cut})
     read = read_session(write_single(recording, tmp_path / "out")).recordings[0]
     assert len(clipped) > 100
-    assert_subset(read.tension["cable_1"], sound, clipped)
+    (end_at,) = limits(cut.values)
+    assert_subset(read.tension["cable_1"], sound, set(np.flatnonzero(end_at.reached).tolist()))
+    assert clipped == set(np.flatnonzero(end_at.stuck).tolist())
+    assert not np.any(end_at.reached & (sound.values[:, 0] < limit - 50.0))
     assert account(read, CABLE).clipped == len(clipped)
     (end,) = account(read, CABLE).overranges
     assert (end.device, end.quantity, end.axis, end.unit) == ("cable_1", "tension", None, "N")
@@ -207,6 +210,23 @@ def test_both_ends_of_the_range_are_found() -> None:
     signal = SINE + 0.01 * NOISE
     clipped = clipped_samples(np.clip(signal, -0.8, 0.9)[:, None])
     np.testing.assert_array_equal(clipped, (signal <= -0.8) | (signal >= 0.9))
+
+
+def test_what_is_left_of_a_clipped_signal_has_its_scale() -> None:
+    """Of what lies near the limit noise decides what is stuck: the rest alone reads a scale too small."""
+    signal, std = SINE, 0.15
+    (lower, upper) = limits(np.clip(signal + std * NOISE, -0.8, 0.8)[:, None])
+    reading = signal + std * NOISE
+
+    def scale_error(kept: np.ndarray) -> float:
+        """In its own std."""
+        moved = signal[kept]
+        return float(moved @ (reading[kept] - moved) / (std * np.sqrt(moved @ moved)))
+
+    assert scale_error(~(lower.stuck | upper.stuck)) < -6.0
+    kept = ~(lower.reached | upper.reached)
+    assert np.count_nonzero(kept) > 1000
+    assert abs(scale_error(kept)) < 3.0
 
 
 def test_channels_that_measure_nothing(tmp_path: Path) -> None:

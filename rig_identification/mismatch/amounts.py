@@ -137,17 +137,22 @@ def supports(
         found.append(max(((t, t.best(sinks)) for t in tried), key=lambda t: t[1].gain))
     out = [promise for _, promise in found]
     first = int(np.argmax([promise.gain for promise in out]))
-    if out[first].gain > 0.0 and not budget.spent():
-        out[first] = found[first][0].refined(out[first], spaced)
+    for i, (amount, promise) in enumerate(found):
+        if promise.gain > 0.0 and (i == first or (i == 0 and promise.share > WORTH)) and not budget.spent():
+            out[i] = amount.refined(promise, spaced)
     return out
 
 
 def stretching(problem: Problem, evaluation: Evaluation, mass: float) -> Promise | None:
-    """Cables that stretch, at their best stiffness; None where the model gives way already."""
+    """Cables that stretch, at their best stiffness; None where the model gives way already.
+
+    Where they ring with the exciter a fifth more or less hides most of what they explain: any share that is
+    worth a fit is looked at more finely.
+    """
     if gives_way(problem.bench.parameters.model):
         return None
     amount, promise = _stretching(problem, evaluation, mass)
-    return amount.refined(promise, _spacing(evaluation)) if promise.share > CHIEF else promise
+    return amount.refined(promise, _spacing(evaluation)) if promise.share > WORTH else promise
 
 
 def _stretching(problem: Problem, evaluation: Evaluation, mass: float) -> tuple[Amount, Promise]:

@@ -52,9 +52,7 @@ def compatible(candidates: list[Candidate], found: list[Candidate]) -> list[Cand
     """
     names = {q.name for c in found for q in c.parameters}
     entries = {entry for c in found for entry in _written(c)}
-    return [
-        c for c in candidates if not names & {q.name for q in c.parameters} and not entries & _written(c)
-    ]
+    return [c for c in candidates if not names & {q.name for q in c.parameters} and not entries & _written(c)]
 
 
 def _written(candidate: Candidate) -> set[tuple[str, int]]:
@@ -92,5 +90,25 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
         # A hose's nine numbers promise more of anything, and take no place from what is fitted in a second
         others = out if p.candidate.slow else [q for q in out if not q.candidate.slow]
         if p.gain > WORTH * worthy[0].gain and alike < most and len(others) < FITTED:
+            out.append(p)
+    return out
+
+
+def as_likely(promises: list[Promise], worthy: list[Promise], meant: float) -> list[Promise]:
+    """Near the noise: of effects without a promise among the ``worthy``, the best that are about as likely.
+
+    An effect is as likely beforehand wherever it is: a level that promises less than one hinge of twenty-four
+    may be as likely as that, and is told beside it. What takes long to fit is not. meant: nats that count.
+    """
+
+    def likely(promise: Promise) -> float:
+        return promise.gain - float(np.log(promise.candidate.places))
+
+    least = max(map(likely, worthy), default=np.inf) - meant
+    seen = {p.candidate.effect for p in worthy}
+    out: list[Promise] = []
+    for p in promises:
+        if p.candidate.effect not in seen and not p.candidate.slow and likely(p) > least:
+            seen.add(p.candidate.effect)
             out.append(p)
     return out

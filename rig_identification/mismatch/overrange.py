@@ -54,7 +54,8 @@ def _finding(ends: list[tuple[Recording, Overrange]]) -> Finding:
     count = sum(end.samples for _, end in ends)
     text = (
         f"{first.device} stops at the end of its range: {count} samples of {what} lie exactly at {stops} "
-        f"{first.unit} and are left out of the fit. Set a larger range or shake more gently."
+        f"{first.unit}. All that noise may have brought there is left out of the fit. Set a larger range or "
+        "shake more gently."
     )
     told = {"limit": (abs(limit) if both else limit, 0.0, first.unit)}
     return Finding("unknown", where, written(told), _NOTHING, text)

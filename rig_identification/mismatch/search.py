@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve, still_promised
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
+from rig_identification.mismatch.at_rest import at_rest, from_rest
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
@@ -31,7 +32,7 @@ from rig_identification.mismatch.first_fits import (
     leading,
     shows,
 )
-from rig_identification.mismatch.hypotheses import count_of, worth_a_fit
+from rig_identification.mismatch.hypotheses import as_likely, count_of, worth_a_fit
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
@@ -53,7 +54,7 @@ from rig_identification.mismatch.trial import (
     mass_of,
     ordinary_errors,
 )
-from rig_identification.mismatch.unbent import at_first, best_of, likely, unbent
+from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, unbent
 
 #: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
 #: than so much and whole runs do not refute it.
@@ -234,6 +235,8 @@ class _Look:
         if self.fitted is not None and all(p.candidate.label != self.fitted.candidate.label for p in worthy):
             # More than first order promised may have come of it
             worthy += [p for p in self.promises if p.candidate.label == self.fitted.candidate.label]
+        if not self.far and worthy:
+            worthy += as_likely(self.promises, worthy, MEANT)
         self.begin(worthy)
 
     def outright(self) -> None:
@@ -251,8 +254,31 @@ class _Look:
         self.begin(promised)
         self.hopeless = {p.candidate.label for p in self.untried(promised)} if not self.at_noise else set()
 
+    def at_rest(self) -> None:
+        """What the static recordings ask for by themselves, started where they have it.
+
+        What explains them about as well as one that leaves only noise gets its turn beside it: an upper hinge
+        that is off is alike to a ceiling off level.
+        """
+        self.notify("what rest asks for")
+        asked = at_rest(self.here, self.seen, self.candidates, self.budget)[:MOST]
+        for found in asked:
+            behind = asked[0].promise.gain - found.promise.gain
+            if self.budget.spent() or (self.at_noise and behind > BEATEN):
+                break
+            start = from_rest(self.here, self.seen, found)
+            if start is None:
+                continue
+            self.notify(found.promise.candidate.label)
+            trial = attempt(self.here, start, found.promise, self.budget)
+            if trial is not None:
+                self.tried.append(trial)
+
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
-        """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
+        """What rest asks for (at_rest.py) and first order promises in a rig as described (unbent.py)."""
+        self.at_rest()
+        if self.enough:
+            return
         self.notify("from where nothing is bent")
         about = unbent(self.here, self.seen)
         first = None if guess is None else at_first(self.here, self.seen, guess)

@@ -52,7 +52,7 @@ class Channel:
     topic: Topic
     stamp_ns: NDArray[
         np.int64
-    ]  # (n,) strictly increasing; samples that are not finite or clipped are left out
+    ]  # (n,) strictly increasing; samples that are not finite, clipped or nearly so are left out
     values: NDArray[np.float64]  # (n, width)
     count: int  # messages in the bag
     selection: StampSelection
@@ -147,10 +147,11 @@ def _clean(
         notes = ("the values never change: the device may be stuck or switched off",)
     clipped = np.zeros(len(values), bool)
     ends = limits(values[finite]) if topic.channel in _CAN_CLIP else []
+    used = finite.copy()
     for end in ends:
         clipped[finite] |= end.stuck
+        used[finite] &= ~end.reached
     stuck = tuple((end, stamp_ns[finite][end.stuck]) for end in ends)
-    used = finite & ~clipped
     return Channel(
         topic, stamp_ns[used], np.ascontiguousarray(values[used]), count, selection, stamp_ns,
         int(np.count_nonzero(~finite)), int(np.count_nonzero(clipped)), notes, stuck,

@@ -1,4 +1,9 @@
-"""Samples stuck at the end of a sensor's range."""
+"""Samples stuck at the end of a sensor's range, and what lies so near that noise decides whether it is.
+
+Leaving out what is stuck alone would bias what is left: of samples within reach of the limit those whose
+noise points outwards are gone, and what stays reads like a sensor whose scale is too small. So all is left
+out where the signal itself comes within reach, whatever its noise did to the single sample.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 #: Consecutive samples at exactly the extreme value that noise does not make.
 _RUN = 4
@@ -14,6 +20,12 @@ _DISTINCT = 16
 #: The crest of a sine in a coarse converter holds up to 1 / (sqrt(2) - 1) = 2.4 times the samples of the step
 #: below.
 _CREST = 4
+#: Samples whose mean is the signal itself, next to their noise.
+_SMOOTHED = 5
+#: Std of the noise within which of a limit it decides what is stuck.
+_REACH = 3.0
+#: A normal distribution's std over the median of its absolute values.
+_MEDIAN_TO_STD = 1.4826
 
 
 @dataclass(frozen=True)
@@ -23,6 +35,7 @@ class Limit:
     column: int
     value: float
     stuck: NDArray[np.bool_]  # (n,) which samples
+    reached: NDArray[np.bool_]  # (n,) those, and all where the signal is within the noise's reach of it
 
 
 def limits(values: NDArray[np.float64]) -> list[Limit]:
@@ -45,7 +58,8 @@ def limits(values: NDArray[np.float64]) -> list[Limit]:
         for level, count, below in ((levels[0], counts[0], counts[1]), (levels[-1], counts[-1], counts[-2])):
             stuck = column == level
             if level != 0.0 and count >= max(_RUN, _CREST * below) and _longest_run(stuck) >= _RUN:
-                out.append(Limit(k, float(level), stuck))
+                reached = stuck | _within_reach(column, float(level), stuck, upper=level == levels[-1])
+                out.append(Limit(k, float(level), stuck, reached))
     return out
 
 
@@ -55,6 +69,18 @@ def clipped_samples(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     for limit in limits(values):
         clipped |= limit.stuck
     return clipped
+
+
+def _within_reach(
+    column: NDArray[np.float64], level: float, stuck: NDArray[np.bool_], *, upper: bool
+) -> NDArray[np.bool_]:
+    """Where the mean over a few samples comes within a few std of the noise of ``level``."""
+    free = ~(stuck[:-2] | stuck[1:-1] | stuck[2:])
+    bends = np.diff(column, 2)[free]
+    # White noise has a second difference of variance 1 + 4 + 1; the signal's own makes the reach wider
+    noise = _MEDIAN_TO_STD * float(np.median(np.abs(bends))) / np.sqrt(6.0) if bends.size else 0.0
+    mean = uniform_filter1d(column, _SMOOTHED, mode="nearest")
+    return mean >= level - _REACH * noise if upper else mean <= level + _REACH * noise
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> int:
