@@ -72,9 +72,10 @@ def check(read: Callable[[Array, Array, Array], sensors.Reading], motion: Motion
 @settings(max_examples=5, deadline=None, derandomize=True)
 def test_load_cell(seed: int) -> None:
     motion = swing(seed)
-    check(lambda raw, R, d: sensors.load_cell(raw, 1, d), motion, np.array([0.01, 4.0]))
-    reading = sensors.load_cell(motion.outputs, 2, np.array([0.02, -3.0]))
-    np.testing.assert_allclose(reading.values[:, 0], 1.02 * motion.outputs[:, layout.OUT_TENSION + 2] - 3.0)
+    check(lambda raw, R, d: sensors.load_cell(raw, 1, d), motion, np.array([0.01, 4.0, 2e-6]))
+    reading = sensors.load_cell(motion.outputs, 2, np.array([0.02, -3.0, 1e-6]))
+    tension = motion.outputs[:, layout.OUT_TENSION + 2]
+    np.testing.assert_allclose(reading.values[:, 0], 1.02 * tension - 3.0 + 1e-6 * tension**2)
 
 
 @given(SEEDS)

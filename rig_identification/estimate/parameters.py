@@ -79,7 +79,7 @@ class DeviceLayout:
 
     @property
     def load_cells(self) -> int:
-        """First entry of the load cells: gain error and zero of each."""
+        """First entry of the load cells: gain error, zero and curve of each."""
         return 0
 
     @property

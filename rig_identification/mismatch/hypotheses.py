@@ -18,7 +18,7 @@ from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
-from rig_identification.mismatch.sensor_errors import sensor_errors
+from rig_identification.mismatch.sensor_errors import bent_cells, sensor_errors
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3
@@ -37,6 +37,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
     )
     every = [
         *sensor_errors(rig, parameters, devices_of(problem)),
+        *bent_cells(rig, parameters, mass),
         *rig_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]

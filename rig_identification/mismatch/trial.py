@@ -377,7 +377,7 @@ def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool
     parameters = trial.problem.bench.parameters
     values = parameters.named(trial.evaluation.point.theta)
     freed = [p for p in trial.candidate.parameters if p.name in ordinary]
-    if not freed:
+    if len(freed) < len(trial.candidate.parameters):
         return True
     return any(abs(values[p.name] - p.nominal) > limit * ordinary[p.name] for p in freed)
 

@@ -34,20 +34,25 @@ class Reading:
     in_device: Array
 
 
-#: load_cell: gain error 1, zero N
-LOAD_CELL_SIZE = 2
+#: load_cell: gain error 1, zero N, curve 1/N
+LOAD_CELL_SIZE = 3
 
 
 def load_cell(raw: Array, cable: int, device: Array) -> Reading:
-    """Tension (1 + gain) T + zero of one cable, N. device (2,): gain error, zero."""
+    """Tension (1 + gain) T + zero + curve T^2 of one cable, N. device (3,): gain error, zero, curve.
+
+    curve: the first term of a bridge or an amplifier that is not straight.
+    """
     nodes, width = raw.shape
     tension = raw[:, layout.OUT_TENSION + cable]
     in_raw = np.zeros((nodes, 1, width))
-    in_raw[:, 0, layout.OUT_TENSION + cable] = 1.0 + device[0]
+    in_raw[:, 0, layout.OUT_TENSION + cable] = 1.0 + device[0] + 2.0 * device[2] * tension
     in_device = np.zeros((nodes, 1, LOAD_CELL_SIZE))
     in_device[:, 0, 0] = tension
     in_device[:, 0, 1] = 1.0
-    return Reading(((1.0 + device[0]) * tension + device[1])[:, None], in_raw, in_device)
+    in_device[:, 0, 2] = tension**2
+    values = (1.0 + device[0] + device[2] * tension) * tension + device[1]
+    return Reading(values[:, None], in_raw, in_device)
 
 
 #: imu: position error 3, rotation error 3, gyroscope bias 3 and scale 3, accelerometer bias 3 and scale 3

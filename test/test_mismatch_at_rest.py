@@ -1,0 +1,68 @@
+"""What the static recordings ask for by themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit
+from rig_identification.estimate.identify import fit_session
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.at_rest import ALIKE, at_rest, from_rest
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.trial import attempt
+from rig_identification.simulate import simulate_session
+
+#: m: one of four cables too long, so that three carry nearly all.
+LONGER = 0.02
+
+
+def _fitted(effects: dict[str, tuple[float, ...]]) -> tuple[Problem, Evaluation]:
+    spec = replace(shaken(10, 6.0), effects=effects, doubts=False)
+    fitted = fit_session(simulate_session(spec, np.random.default_rng(2))[0])
+    return with_reference(fitted.problem, fitted.rest), fitted.evaluation
+
+
+@pytest.fixture(scope="module")
+def longer() -> tuple[Problem, Evaluation]:
+    return _fitted({"cable_length": (0.0, 0.0, LONGER, 0.0)})
+
+
+def test_a_cable_that_is_too_long_is_asked_for_first(longer: tuple[Problem, Evaluation]) -> None:
+    problem, evaluation = longer
+    asked = at_rest(problem, evaluation, catalogue(problem))
+    first = asked[0].promise
+    assert first.candidate.label == "cable_length cable_3"
+    (value,) = first.values.values()
+    assert abs(value - first.candidate.parameters[0].nominal - LONGER) < 0.005
+    effects = [a.promise.candidate.effect for a in asked]
+    assert max(effects.count(e) for e in effects) <= ALIKE
+
+
+def test_from_there_the_motion_is_explained(longer: tuple[Problem, Evaluation]) -> None:
+    problem, evaluation = longer
+    assert misfit(evaluation) > NEAR_SQUARE
+    first = at_rest(problem, evaluation, catalogue(problem))[0]
+    start = from_rest(problem, evaluation, first)
+    assert start is not None
+    trial = attempt(problem, start, first.promise)
+    assert trial is not None
+    assert misfit(trial.evaluation) < 1.1
+
+
+def test_a_rig_as_described_asks_for_nothing_at_rest() -> None:
+    problem, evaluation = _fitted({"hinge_damping": (30.0,)})
+    assert at_rest(problem, evaluation, catalogue(problem)) == []
+
+
+def test_nothing_is_asked_without_static_recordings_or_time(longer: tuple[Problem, Evaluation]) -> None:
+    problem, evaluation = longer
+    candidates = catalogue(problem)
+    bare = replace(problem, rests=())
+    assert at_rest(bare, evaluation, candidates) == []
+    assert at_rest(problem, evaluation, candidates, Budget(0.0)) == []
