@@ -80,7 +80,8 @@ def _within_reach(
     # White noise has a second difference of variance 1 + 4 + 1; the signal's own makes the reach wider
     noise = _MEDIAN_TO_STD * float(np.median(np.abs(bends))) / np.sqrt(6.0) if bends.size else 0.0
     mean = uniform_filter1d(column, _SMOOTHED, mode="nearest")
-    return mean >= level - _REACH * noise if upper else mean <= level + _REACH * noise
+    near = mean >= level - _REACH * noise if upper else mean <= level + _REACH * noise
+    return np.asarray(near)
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> int:
