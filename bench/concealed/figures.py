@@ -10,6 +10,7 @@ from scipy.stats import binomtest
 
 from bench.concealed.answer import ELEMENTS
 from bench.concealed.marks import SessionMarks
+from bench.concealed.wording import CLEAR
 
 HOLDOUT_LIMIT = 1.1
 PARAMETER_LIMIT = 3.0  # sigma
@@ -90,6 +91,11 @@ def shares(marks: Sequence[SessionMarks]) -> list[Share]:
         _count("first place right, any size", table, lambda m: m.first_right),
         _count("first three or stated tie, any size", table, lambda m: m.three_right),
         _count("pairs: both named", [m for m in table if m.kind == "pair"], lambda m: m.all_named),
+        _count(
+            "pairs: both named, each clear by itself",
+            [m for m in table if m.kind == "pair" and (m.fainter or 0.0) >= CLEAR],
+            lambda m: m.all_named,
+        ),
         *(_place(table, key) for key in ("channel", "axis", "end", "times")),
         _count("parameters within 3 sigma", told, lambda s: abs(s) <= PARAMETER_LIMIT),
         *_coverage("all answers", answered),

@@ -59,6 +59,8 @@ def make_session(
         ideal = replace(ideal, plans=scene.plans)
         paths = simulate(ideal, [])
     truth["effect_over_noise"] = effect_over_noise(ideal, paths, scene, altered, effects)
+    if len(effects) > 1:
+        truth["alone_over_noise"] = [alone_over_noise(ideal, paths, effect) for effect in effects]
     return session, truth
 
 
@@ -153,6 +155,18 @@ def effect_over_noise(
         other = device_samples(paths[k], scene, effects, plan, k, noise=0.0)
         out[plan.name] = truths.channel_differences(clean, other, scene)
     return out
+
+
+def alone_over_noise(
+    ideal: Scene, paths: list[Trajectory], effect: Effect
+) -> dict[str, dict[str, float]] | None:
+    """:func:`effect_over_noise` of one of several effects by itself; None where it cannot be run so."""
+    scene = effect.alter(ideal)
+    try:
+        altered = simulate(scene, [effect]) if effect.mechanical else paths
+    except RuntimeError:
+        return None
+    return effect_over_noise(ideal, paths, scene, altered, [effect])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -71,6 +71,7 @@ class SessionMarks:
     holdout_after: float | None = None
     seconds: float | None = None
     reason: str | None = None
+    fainter: float | None = None  # of a pair: what the fainter one changes by itself, over noise
 
     @property
     def miss(self) -> bool:
@@ -104,6 +105,7 @@ def mark(
         "truth": tuple(e["effect"] for e in effects),
         "size": size,
         "over_noise": loudest,
+        "fainter": least_over_noise(truth),
         "seconds": seconds,
         "reason": reason,
     }
@@ -146,9 +148,19 @@ def kind_of(truth: Mapping[str, Any]) -> str:
 
 def over_noise(truth: Mapping[str, Any]) -> float:
     """Largest rms over noise among the channels of all recordings that a fit may use."""
+    return _largest(truth.get("effect_over_noise", {}))
+
+
+def least_over_noise(truth: Mapping[str, Any]) -> float | None:
+    """The same of the fainter of a pair, each by itself; None where it is not known."""
+    each = truth.get("alone_over_noise") or [None]
+    return None if None in each else min(map(_largest, each))
+
+
+def _largest(by_recording: Mapping[str, Mapping[str, float]]) -> float:
     # run_2 is held out: what shows there alone, no fit can find.
-    by_recording = {k: v for k, v in truth.get("effect_over_noise", {}).items() if k != "run_2"}
-    return max((float(v) for channels in by_recording.values() for v in channels.values()), default=0.0)
+    used = (channels for name, channels in by_recording.items() if name != "run_2")
+    return max((float(v) for channels in used for v in channels.values()), default=0.0)
 
 
 def mark_ten(ten: Ten, true: Array) -> TenMarks:
