@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,14 @@ from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Finding
 
 Array = NDArray[np.float64]
+
+
+def effects_of(findings: Sequence[Finding]) -> str:
+    """Effects by name; what the contract's table has no word for, by where it is."""
+    return ", ".join(
+        f"what bends {f.where['channel']}" if f.effect == "unknown" and f.where.get("channel") else f.effect
+        for f in findings
+    )
 
 
 def finding(

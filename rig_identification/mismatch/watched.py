@@ -21,7 +21,7 @@ from rig_identification.estimate.segments import PIECE, in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.explained import evidence_of
-from rig_identification.mismatch.findings import finding
+from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hands import hand_finding
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
@@ -132,7 +132,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     hand = hand_finding(ideal)
     if hand is not None:
         findings.append(hand)
-    named = ", ".join(f.effect for f in findings)
+    named = effects_of(findings)
     if verdict.verdict == "none":
         mismatch = Mismatch(
             "explained", f"With {named} in the model every residual is noise.", tuple(findings), choice.rivals

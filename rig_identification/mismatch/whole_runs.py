@@ -12,7 +12,7 @@ from rig_identification.estimate.solve import Point, Problem
 from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
-from rig_identification.mismatch.findings import finding
+from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
@@ -44,7 +44,7 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     trace = heard is not None and not heard.contradicted
     loose = heard.looseness if heard is not None and trace else 1.0
     findings = _findings(ideal, fitted, found, after.holdout, loose)
-    named = ", ".join(f.effect for f in findings)
+    named = effects_of(findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
     if verdict.verdict == "none":
         told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
