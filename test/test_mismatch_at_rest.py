@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
@@ -14,8 +15,10 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.at_rest import ALIKE, at_rest, from_rest
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.trial import attempt
+from rig_identification.recording import Recording
 from rig_identification.simulate import simulate_session
 
 #: m: one of four cables too long, so that three carry nearly all.
@@ -66,3 +69,32 @@ def test_nothing_is_asked_without_static_recordings_or_time(longer: tuple[Proble
     bare = replace(problem, rests=())
     assert at_rest(bare, evaluation, candidates) == []
     assert at_rest(problem, evaluation, candidates, Budget(0.0)) == []
+
+
+#: rad about y of an IMU that all else contradicts, and kg of liquid beside it.
+TURNED, LIQUID = 0.05, 20.0
+
+
+def _turned(recording: Recording) -> Recording:
+    imu = recording.imu
+    assert imu is not None
+    turn = Rotation.from_rotvec([0.0, TURNED, 0.0]).inv()
+    values = np.concatenate([turn.apply(imu.values[:, :3]), turn.apply(imu.values[:, 3:])], axis=1)
+    return replace(recording, imu=replace(imu, values=values))
+
+
+def test_what_rest_is_certain_of_leads_to_what_swings_beside_it() -> None:
+    effects = {
+        "liquid_slosh.mass": (LIQUID,),
+        "liquid_slosh.frequency": (0.9,),
+        "liquid_slosh.damping_ratio": (0.01,),
+        "liquid_slosh.position": (0.9, 2.0, -0.6),
+    }
+    spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
+    made, _ = simulate_session(spec, np.random.default_rng(2))
+    found = identify(replace(made, recordings=tuple(_turned(r) for r in made.recordings))).mismatch
+    named = {f.effect: f.parameters for f in found.findings}
+    assert (found.verdict, set(named)) == ("explained", {"imu_misalignment", "liquid_slosh"})
+    angle, mass = named["imu_misalignment"]["angle"], named["liquid_slosh"]["mass"]
+    assert abs(angle["value"] - TURNED) < 3.0 * angle["std"]  # type: ignore[operator]
+    assert abs(mass["value"] - LIQUID) < 3.0 * mass["std"]  # type: ignore[operator]

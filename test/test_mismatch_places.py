@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from test_simulate_identify import seen_by_the_true_body, shaken
 
-from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.candidate import MANY, Candidate, added
 from rig_identification.mismatch.hypotheses import as_likely, catalogue
 from rig_identification.mismatch.places import TERMS, best_place, crossed, design, monomials
-from rig_identification.mismatch.screen import Promise, screen
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.trial import Trial, in_reach, mass_of
 
 
 def told_by(
@@ -112,3 +112,17 @@ def test_an_effect_of_few_places_is_fitted_beside_one_of_many() -> None:
     assert as_likely(promises, worthy, 4.0) == [promises[2], promises[3]]
     assert as_likely([*promises, Promise(level, 5.9, {})], worthy, 3.0) == [promises[2]]
     assert as_likely(promises, [], 3.0) == []
+
+
+@pytest.mark.parametrize(("away", "possible"), [(0.5, True), (3.9, True), (6.0, False)])
+def test_a_hose_is_tied_to_what_a_body_in_this_rig_may_fill(away: float, possible: bool) -> None:
+    """away: of its point from the body's middle, in lengths of the rig; known to one of them, no better."""
+    problem, found = seen_by_the_true_body(replace(shaken(14, 4.0), doubts=False), 3)
+    hose = next(c for c in catalogue(problem) if c.label == "tether x")
+    wide = extended(problem, (hose,))
+    point = carried(wide, problem, found.point)
+    theta = point.theta.copy()
+    theta[wide.bench.parameters.index_of("tether.point.y")] = away
+    there = evaluate(wide, replace(point, theta=theta))
+    assert there is not None
+    assert in_reach(Trial(hose, wide, there, 0.0)) is possible

@@ -142,6 +142,10 @@ def trials(
     if misfit(seen) > VERY_FAR:
         look.outright()
         if not look.enough:
+            look.at_rest()
+            if more and look.certain is not None:
+                return Trials(look.told([look.certain]), led=True)
+        if not look.enough:
             look.from_nothing_bent(guess)
     lead = look.leading() if more else None
     if lead is None and not look.enough and (not far or (promises and promises[0].share > DIRECT)):
@@ -185,6 +189,7 @@ class _Look:
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
+    certain: Trial | None = None  # what rest asks for and the motion confirms, beside something else
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
@@ -258,7 +263,8 @@ class _Look:
         """What the static recordings ask for by themselves, started where they have it.
 
         What explains them about as well as one that leaves only noise gets its turn beside it: an upper hinge
-        that is off is alike to a ceiling off level.
+        that is off is alike to a ceiling off level. What rest asks for, and takes nearly all of the motion's
+        residual away, and leaves too much for noise, is certain: what is left is another effect's.
         """
         self.notify("what rest asks for")
         asked = at_rest(self.here, self.seen, self.candidates, self.budget)[:MOST]
@@ -273,12 +279,14 @@ class _Look:
             trial = attempt(self.here, start, found.promise, self.budget)
             if trial is not None:
                 self.tried.append(trial)
+        first = max(self.tried, key=lambda t: t.evidence, default=None)
+        if first is None or self.enough or excess(first.evaluation) > (1.0 - DIRECT) * excess(self.seen):
+            return
+        if any(a.promise.candidate is first.candidate and a.promise.gain > BEATEN for a in asked):
+            self.certain = self.finished(first)
 
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
-        """What rest asks for (at_rest.py) and first order promises in a rig as described (unbent.py)."""
-        self.at_rest()
-        if self.enough:
-            return
+        """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
         self.notify("from where nothing is bent")
         about = unbent(self.here, self.seen)
         first = None if guess is None else at_first(self.here, self.seen, guess)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import (
     NEAR_SQUARE,
     fit_start_growing,
@@ -316,8 +317,28 @@ def _closest(trial: Trial, stop: Stop) -> Trial:
 
 
 def _sensible(trial: Trial) -> bool:
-    """Whether what cannot be negative is not."""
-    return all(z >= (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial))
+    """Whether what cannot be negative is not, and what is at a place of the body can be there."""
+    right = all(z >= (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial))
+    return right and in_reach(trial)
+
+
+def in_reach(trial: Trial) -> bool:
+    """Whether no coordinate of an effect's place lies clear of all that a body in this rig may fill.
+
+    A hose eight metres beside the car that it pulls at stands for something else.
+    """
+    free = trial.problem.bench.parameters.free
+    size = float(np.max(extent(trial.problem.bench.rig)))
+    names = {p.name for p in trial.candidate.parameters if ".point." in p.name or ".position." in p.name}
+    if not names:
+        return True
+    std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))[INERTIAL:]
+    theta = trial.evaluation.point.theta[INERTIAL:]
+    return all(
+        (abs(t) - ABSURD * s) * q.prior_std <= size
+        for t, s, q in zip(theta, std, free, strict=False)
+        if q.name in names
+    )
 
 
 def _described(trial: Trial, candidate: Candidate, values: dict[str, float], stop: Stop) -> Trial | None:

@@ -16,7 +16,7 @@ from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, beyond_doubt, ordinary_errors, strength
+from rig_identification.mismatch.trial import Trial, beyond_doubt, in_reach, ordinary_errors, strength
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -46,7 +46,10 @@ def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Proble
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = effects_of(findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
-    if verdict.verdict == "none":
+    if not all(in_reach(as_fitted(fitted, t)) for t in found):
+        told, trace = "unexplained", False
+        text = f"{named} would act where no body in this rig can be: it stands for something else. {errors}"
+    elif verdict.verdict == "none":
         told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
     elif trace:
         told, text = "explained", f"{named} explains all but a trace. {errors} {verdict.explanation}"
