@@ -136,10 +136,12 @@ def supports(
         tried = [Amount(problem, evaluation, c, f"ceiling.compliance.{a}") for c in ceilings]
         found.append(max(((t, t.best(sinks)) for t in tried), key=lambda t: t[1].gain))
     out = [promise for _, promise in found]
-    first = int(np.argmax([promise.gain for promise in out]))
-    for i, (amount, promise) in enumerate(found):
-        if promise.gain > 0.0 and (i == first or (i == 0 and promise.share > WORTH)) and not budget.spent():
-            out[i] = amount.refined(promise, spaced)
+    finer = {int(np.argmax([promise.gain for promise in out]))}
+    if out[0].share > WORTH:  # cables that stretch: see stretching
+        finer.add(0)
+    for i in sorted(finer):
+        if out[i].gain > 0.0 and not budget.spent():
+            out[i] = found[i][0].refined(out[i], spaced)
     return out
 
 

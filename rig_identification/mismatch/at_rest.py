@@ -26,7 +26,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import count_of, needed_gain
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.trial import log_evidence
-from rig_identification.mismatch.unbent import at_first
+from rig_identification.mismatch.unbent import as_described, at_first
 
 #: Where fits start, in std of a number's prior.
 ASIDE = (0.3, -0.3)
@@ -55,10 +55,7 @@ def at_rest(
     if not problem.rests:
         return []
     still = replace(problem, runs=())
-    theta = evaluation.point.theta.copy()
-    for i, q in enumerate(problem.bench.parameters.free, start=INERTIAL):
-        if q.bounded:
-            theta[i] = 0.0
+    theta = as_described(problem, evaluation.point.theta)
     without = _fitted(still, Point(theta, (), evaluation.point.rest_guesses))
     if without is None or _quiet(still, without):
         return []

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
+from rig_identification.estimate.prediction import device_start
 from rig_identification.mismatch.candidate import Candidate, Told
-from rig_identification.model import sensors as devices
 from rig_identification.rig import Rig
 
 #: Plausible range (std of the prior once freed) of each error.
@@ -87,7 +87,7 @@ def bent_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidat
     """
     share = mass * rig.gravity / len(rig.cables)
     out = []
-    for i, cable in enumerate(rig.cables):
+    for cable in rig.cables:
         line = [
             freed(parameters, f"{cable.name}.load_cell_{name}", RANGE[f"load_cell_{name}"])
             for name in ("gain", "zero")
@@ -95,7 +95,7 @@ def bent_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidat
         if any(p is None for p in line):
             continue
         name, std = f"{cable.name}.load_cell_curve", RANGE["load_cell_curve"] / share
-        entry = parameters.places.load_cells + devices.LOAD_CELL_SIZE * i + 2
+        entry = device_start(parameters.places, cable.name) + 2
         curve = Parameter(name, "1/N", 0.0, std, "device", entry, bounded=False)
         out.append(
             Candidate(

@@ -17,6 +17,7 @@ from rig_identification.estimate.growing import (
     misfit,
     settled_starts,
 )
+from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
@@ -327,18 +328,12 @@ def in_reach(trial: Trial) -> bool:
 
     A hose eight metres beside the car that it pulls at stands for something else.
     """
-    free = trial.problem.bench.parameters.free
-    size = float(np.max(extent(trial.problem.bench.rig)))
     names = {p.name for p in trial.candidate.parameters if ".point." in p.name or ".position." in p.name}
     if not names:
         return True
-    std = np.sqrt(np.diag(invert_information(trial.evaluation.information)))[INERTIAL:]
-    theta = trial.evaluation.point.theta[INERTIAL:]
-    return all(
-        (abs(t) - ABSURD * s) * q.prior_std <= size
-        for t, s, q in zip(theta, std, free, strict=False)
-        if q.name in names
-    )
+    size = float(np.max(extent(trial.problem.bench.rig)))
+    estimates = parameter_estimates(trial.problem, trial.evaluation)
+    return all(abs(p.value - p.nominal) - ABSURD * p.std <= size for p in estimates if p.name in names)
 
 
 def _described(trial: Trial, candidate: Candidate, values: dict[str, float], stop: Stop) -> Trial | None:

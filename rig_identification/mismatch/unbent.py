@@ -29,13 +29,17 @@ MOST = 4
 ALIKE = 0.05
 
 
+def as_described(problem: Problem, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Parameters of the same body, and of all that an effect added, in a rig as it is described."""
+    bent = [i for i, q in enumerate(problem.bench.parameters.free, start=INERTIAL) if q.bounded]
+    theta = theta.copy()
+    theta[bent] = 0.0
+    return theta
+
+
 def unbent(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
     """About the same body, and all that an effect added, in a rig as it is described."""
-    theta = evaluation.point.theta.copy()
-    for i, q in enumerate(problem.bench.parameters.free, start=INERTIAL):
-        if q.bounded:
-            theta[i] = 0.0
-    point = replace(evaluation.point, theta=theta)
+    point = replace(evaluation.point, theta=as_described(problem, evaluation.point.theta))
     return evaluate(problem, replace(point, starts=settled_starts(problem, point)))
 
 
