@@ -72,10 +72,12 @@ def check(read: Callable[[Array, Array, Array], sensors.Reading], motion: Motion
 @settings(max_examples=5, deadline=None, derandomize=True)
 def test_load_cell(seed: int) -> None:
     motion = swing(seed)
-    check(lambda raw, R, d: sensors.load_cell(raw, 1, d), motion, np.array([0.01, 4.0, 2e-6]))
-    reading = sensors.load_cell(motion.outputs, 2, np.array([0.02, -3.0, 1e-6]))
-    tension = motion.outputs[:, layout.OUT_TENSION + 2]
-    np.testing.assert_allclose(reading.values[:, 0], 1.02 * tension - 3.0 + 1e-6 * tension**2)
+    check(
+        lambda raw, R, d: sensors.load_cell(raw, 1, d), motion, np.array([0.01, 4.0, 2e-6, 0.02, 0.5, -0.03])
+    )
+    reading = sensors.load_cell(motion.outputs, 2, np.array([0.02, -3.0, 1e-6, 0.0, 0.04, 0.7]))
+    other, tension = motion.outputs[:, layout.OUT_TENSION + 1 :].T
+    np.testing.assert_allclose(reading.values[:, 0], 1.02 * tension - 3.0 + 1e-6 * tension**2 + 0.04 * other)
 
 
 @given(SEEDS)

@@ -79,17 +79,21 @@ class DeviceLayout:
 
     @property
     def load_cells(self) -> int:
-        """First entry of the load cells: gain error, zero and curve of each."""
+        """First entry of the load cells, of which each has as many (model/sensors.py)."""
         return 0
+
+    def load_cell(self, cable: str) -> int:
+        """First entry of one cable's load cell."""
+        return self.load_cells + devices.load_cell_size(len(self.cables)) * self.cables.index(cable)
 
     @property
     def imu(self) -> int:
-        """First entry of the IMU: 18 numbers (model/sensors.py), then its clock offset."""
-        return devices.LOAD_CELL_SIZE * len(self.cables)
+        """First entry of the IMU: its numbers (model/sensors.py), then its clock offset."""
+        return devices.load_cell_size(len(self.cables)) * len(self.cables)
 
     @property
     def inclinometer(self) -> int:
-        """First entry of the inclinometer: 3 numbers, then its clock offset."""
+        """First entry of the inclinometer: its numbers, then its clock offset."""
         return self.imu + devices.IMU_SIZE + 1
 
     @property
@@ -183,9 +187,9 @@ def _exciter_parameters(c: _Collector, rig: Rig, places: DeviceLayout) -> None:
 
 def _sensor_parameters(c: _Collector, rig: Rig, places: DeviceLayout, channels: set[str]) -> None:
     tolerance = rig.tolerance
-    for i, cable in enumerate(rig.cables):
+    for cable in rig.cables:
         if cable.name in channels:
-            start = places.load_cells + devices.LOAD_CELL_SIZE * i
+            start = places.load_cell(cable.name)
             c.device(f"{cable.name}.load_cell_gain", "1", tolerance["load_cell_gain"], start)
             c.device(f"{cable.name}.load_cell_zero", "N", tolerance["load_cell_zero"], start + 1)
     if "imu" in channels:

@@ -101,9 +101,9 @@ def read_device(
     if device == "mocap" and bench.mocap is not None and R_tracker_mean is not None:
         errors = own[places.mocap : places.mocap + sensors.MOCAP_SIZE]
         return sensors.mocap(raw, R, bench.mocap, R_tracker_mean, errors)
-    cable = places.cables.index(device)
-    start = places.load_cells + sensors.LOAD_CELL_SIZE * cable
-    return sensors.load_cell(raw, cable, own[start : start + sensors.LOAD_CELL_SIZE])
+    cable, start = places.cables.index(device), places.load_cell(device)
+    size = sensors.load_cell_size(len(places.cables))
+    return sensors.load_cell(raw, cable, own[start : start + size])
 
 
 def device_start(places: DeviceLayout, device: str) -> int:
@@ -111,7 +111,7 @@ def device_start(places: DeviceLayout, device: str) -> int:
     fixed = {"imu": places.imu, "inclinometer": places.inclinometer, "mocap": places.mocap}
     if device in fixed:
         return fixed[device]
-    return places.load_cells + sensors.LOAD_CELL_SIZE * places.cables.index(device)
+    return places.load_cell(device)
 
 
 @dataclass(frozen=True)
@@ -210,13 +210,16 @@ def _channel_rows(
         return residual, jacobian, H, D
     device_columns, entries, scale = parameters.device_columns()
     first = device_start(parameters.places, channel.device)
-    size = reading.in_device.shape[2]
+    last = first + reading.in_device.shape[2]
+    # Of a device's numbers most are certain
+    used = sorted({int(entry) for entry in entries if first <= entry < last})
     own_columns = np.zeros((groups, width, parameters.size))
-    in_device = lagged(run.grid.step, tau, reading.in_device[:, columns].reshape(nodes, width * size))
-    own_map = (value @ in_device).reshape(groups, width, size)
+    in_used = reading.in_device[:, columns][:, :, [entry - first for entry in used]]
+    in_used = lagged(run.grid.step, tau, in_used.reshape(nodes, width * len(used)))
+    own_map = (value @ in_used).reshape(groups, width, len(used))
     for column, entry, s in zip(device_columns, entries, scale, strict=True):
-        if first <= entry < first + size:
-            own_columns[:, :, column] += s * own_map[:, :, entry - first]
+        if first <= entry < last:
+            own_columns[:, :, column] += s * own_map[:, :, used.index(int(entry))]
         elif entry == clock:
             own_columns[:, :, column] -= s * (slope @ values)
         elif entry == lag:

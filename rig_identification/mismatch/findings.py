@@ -19,10 +19,14 @@ Array = NDArray[np.float64]
 
 def effects_of(findings: Sequence[Finding]) -> str:
     """Effects by name; what the contract's table has no word for, by where it is."""
-    return ", ".join(
-        f"what bends {f.where['channel']}" if f.effect == "unknown" and f.where.get("channel") else f.effect
-        for f in findings
-    )
+    return ", ".join(map(_called, findings))
+
+
+def _called(found: Finding) -> str:
+    channel, felt = found.where.get("channel"), found.where.get("felt")
+    if found.effect != "unknown" or not channel:
+        return found.effect
+    return f"what bends {channel}" if felt is None else f"what {channel} feels of {felt}"
 
 
 def finding(

@@ -13,6 +13,7 @@ from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.riders import SWINGS
@@ -38,6 +39,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
     every = [
         *sensor_errors(rig, parameters, devices_of(problem)),
         *bent_cells(rig, parameters, mass),
+        *cross_sensitivity(rig, parameters, devices_of(problem)),
         *rig_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]

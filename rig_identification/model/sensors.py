@@ -34,37 +34,74 @@ class Reading:
     in_device: Array
 
 
-#: load_cell: gain error 1, zero N, curve 1/N
-LOAD_CELL_SIZE = 3
+def _mixed(pure: Reading, shares: Array) -> Reading:
+    """A device whose axes feel each other: each reads a share of what the others read beside its own.
+
+    shares (w w,): share of axis j in axis i at i w + j; of an axis in itself there is none, which is its
+    scale. The derivatives in the shares come after the device's other numbers.
+    """
+    nodes, width = pure.values.shape
+    felt = shares.reshape(width, width) * (1.0 - np.eye(width))
+    in_shares = np.zeros((nodes, width, width, width))
+    for i in range(width):
+        for j in range(width):
+            if i != j:
+                in_shares[:, i, i, j] = pure.values[:, j]
+    own = pure
+    if np.any(felt):
+        mix = np.eye(width) + felt
+        own = Reading(pure.values @ mix.T, mix @ pure.in_raw, mix @ pure.in_device)
+    in_device = np.concatenate([own.in_device, in_shares.reshape(nodes, width, width**2)], axis=2)
+    return Reading(own.values, own.in_raw, in_device)
+
+
+#: load_cell: gain error 1, zero N, curve 1/N; then the share of each cable's tension that it feels
+LOAD_CELL_OWN = 3
+
+
+def load_cell_size(cables: int) -> int:
+    """How many numbers a load cell has beside so many ``cables``."""
+    return LOAD_CELL_OWN + cables
 
 
 def load_cell(raw: Array, cable: int, device: Array) -> Reading:
-    """Tension (1 + gain) T + zero + curve T^2 of one cable, N. device (3,): gain error, zero, curve.
+    """Tension (1 + gain) T + zero + curve T^2 + sum of share_j T_j of one cable, N.
 
-    curve: the first term of a bridge or an amplifier that is not straight.
+    device (3 + n,): gain error, zero, curve, and shares of all cables, of which its own says nothing.
+    curve: the first term of a bridge or an amplifier that is not straight. share: of what leaks over from
+    another cell's channel, or of the load that reaches this one beside the cable.
     """
     nodes, width = raw.shape
-    tension = raw[:, layout.OUT_TENSION + cable]
+    tensions = raw[:, layout.OUT_TENSION :]
+    tension = tensions[:, cable]
+    shares = device[LOAD_CELL_OWN:].copy()
+    shares[cable] = 0.0
     in_raw = np.zeros((nodes, 1, width))
+    in_raw[:, 0, layout.OUT_TENSION :] = shares
     in_raw[:, 0, layout.OUT_TENSION + cable] = 1.0 + device[0] + 2.0 * device[2] * tension
-    in_device = np.zeros((nodes, 1, LOAD_CELL_SIZE))
+    in_device = np.empty((nodes, 1, device.size))
     in_device[:, 0, 0] = tension
     in_device[:, 0, 1] = 1.0
     in_device[:, 0, 2] = tension**2
-    values = (1.0 + device[0] + device[2] * tension) * tension + device[1]
+    in_device[:, 0, LOAD_CELL_OWN:] = tensions
+    in_device[:, 0, LOAD_CELL_OWN + cable] = 0.0
+    values = (1.0 + device[0] + device[2] * tension) * tension + device[1] + tensions @ shares
     return Reading(values[:, None], in_raw, in_device)
 
 
-#: imu: position error 3, rotation error 3, gyroscope bias 3 and scale 3, accelerometer bias 3 and scale 3
-IMU_SIZE = 18
+#: imu: position error 3, rotation error 3, gyroscope bias 3 and scale 3, accelerometer bias 3 and scale 3;
+#: then the share of each of its six axes that each of them feels
+IMU_OWN = 18
+IMU_SIZE = IMU_OWN + 36
 
 
 def imu(raw: Array, position: Array, orientation: Array, device: Array) -> Reading:
     """Angular rate and specific force (N, 6) in the IMU frame, at its origin.
 
-    position (3,) m and orientation (3, 3): as described. device (18,): position error m,
+    position (3,) m and orientation (3, 3): as described. device (54,): position error m,
     rotation vector of the frame against its description (rad, body axes), gyroscope bias
-    rad/s, gyroscope scale error, accelerometer bias m/s^2, accelerometer scale error.
+    rad/s, gyroscope scale error, accelerometer bias m/s^2, accelerometer scale error, and what its axes
+    feel of each other (:func:`_mixed`): a gyroscope of specific force, rad/s per m/s^2, for one.
     Specific force at the lever arm r: f + alpha x r + w x (w x r).
     """
     r = position + device[0:3]
@@ -84,7 +121,7 @@ def imu(raw: Array, position: Array, orientation: Array, device: Array) -> Readi
     in_raw[:, 3:, ANGULAR_ACCELERATION] = -C_accel @ skew(r)
     # d(w x (w x r)) = -(skew(w x r) + skew(w) skew(r)) dw
     in_raw[:, 3:, RATE] = -C_accel @ (skew(np.cross(w, r)) + skew(w) @ skew(r))
-    in_device = np.zeros((nodes, 6, IMU_SIZE))
+    in_device = np.zeros((nodes, 6, IMU_OWN))
     in_device[:, 3:, 0:3] = C_accel @ (skew(alpha) + skew(w) @ skew(w))
     J = left_jacobian(device[3:6])
     in_device[:, :3, 3:6] = C_gyro @ skew(w) @ J
@@ -94,7 +131,7 @@ def imu(raw: Array, position: Array, orientation: Array, device: Array) -> Readi
         in_device[:, i, 9 + i] = (w @ to_imu.T)[:, i]
         in_device[:, 3 + i, 12 + i] = 1.0
         in_device[:, 3 + i, 15 + i] = (at_imu @ to_imu.T)[:, i]
-    return Reading(values, in_raw, in_device)
+    return _mixed(Reading(values, in_raw, in_device), device[IMU_OWN:])
 
 
 #: inclinometer: rotation error 3, zero error of x and y

@@ -52,9 +52,9 @@ class Mounts:
         if device == "mocap":
             errors = own[places.mocap : places.mocap + sensors.MOCAP_SIZE]
             return sensors.mocap(outputs, R_world_body, self.mocap, self.R_tracker_mean, errors)
-        cable = places.cables.index(device)
-        start = places.load_cells + sensors.LOAD_CELL_SIZE * cable
-        return sensors.load_cell(outputs, cable, own[start : start + sensors.LOAD_CELL_SIZE])
+        cable, start = places.cables.index(device), places.load_cell(device)
+        size = sensors.load_cell_size(len(places.cables))
+        return sensors.load_cell(outputs, cable, own[start : start + size])
 
     @property
     def mocap(self) -> sensors.MocapMount:

@@ -1,0 +1,81 @@
+"""Readings that feel more than what they are to measure, which the contract's table has no word for.
+
+Next to gain and zero the commonest fault of a measuring chain is that one channel leaks into another: cells
+that share an amplifier or a bracket, a gyroscope that feels acceleration, axes that are not square to each
+other. Each is one share, of one other reading, beside a zero that nobody has taken off.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
+from rig_identification.estimate.prediction import device_start
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.sensor_errors import RANGE, freed
+from rig_identification.model import sensors
+from rig_identification.rig import Rig
+
+#: Plausible range (std of the prior) of a share of a like quantity, and of what a gyroscope feels of specific
+#: force: a poor unit turns by 0.1 deg/s per g.
+SHARE = 0.05
+FELT_FORCE = 0.005
+
+_AXES = [("gyroscope", a) for a in AXES] + [("accelerometer", a) for a in AXES]
+_QUANTITY = {"gyroscope": "angular_rate", "accelerometer": "specific_force"}
+
+
+def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
+    """What one axis, or cell, may feel of another one of its device. devices: those that the runs hold."""
+    out = []
+    cells = [c.name for c in rig.cables if c.name in devices]
+    for cell, other in permutations(cells, 2):
+        entry = device_start(parameters.places, cell) + sensors.LOAD_CELL_OWN
+        entry += parameters.places.cables.index(other)
+        zero = freed(parameters, f"{cell}.load_cell_zero", RANGE["load_cell_zero"])
+        out.append(
+            _felt(
+                Parameter(f"{cell}.feels.{other}", "1", 0.0, SHARE, "device", entry, bounded=False),
+                zero,
+                "The load cell of {channel} feels {felt} as well: it reads {value} of that load too much.",
+                "Look for what the two share: amplifier, cable, bracket. Load one cell at a time.",
+                {"channel": cell, "axis": None, "quantity": "tension", "felt": other},
+            )
+        )
+    if "imu" in devices:
+        out += _imu(parameters)
+    return out
+
+
+def _imu(parameters: ParameterSet) -> list[Candidate]:
+    out = []
+    start = device_start(parameters.places, "imu") + sensors.IMU_OWN
+    for (i, (unit, axis)), (j, (other, felt)) in product(enumerate(_AXES), repeat=2):
+        if i == j or (unit, other) == ("accelerometer", "gyroscope"):
+            # What an accelerometer feels of a turn is where it sits
+            continue
+        alike = unit == other
+        name = f"imu.{unit}.{axis}.feels.{other}.{felt}"
+        kind, std = ("1", SHARE) if alike else ("s/m", FELT_FORCE)
+        # At rest gravity is felt, as a bias
+        bias = None
+        if other == "accelerometer":
+            bias = freed(parameters, f"imu.{unit}_bias.{axis}", RANGE[f"{unit}_bias"])
+        out.append(
+            _felt(
+                Parameter(name, kind, 0.0, std, "device", start + 6 * i + j, bounded=False),
+                bias,
+                f"The {unit}'s {axis} axis feels the {other}'s {felt} axis as well: {{value}} of that.",
+                "Calibrate the unit's cross-axis terms on a turntable and in six positions, or replace it.",
+                {"channel": "imu", "axis": axis, "quantity": _QUANTITY[unit], "felt": f"{other} {felt}"},
+            )
+        )
+    return out
+
+
+def _felt(
+    share: Parameter, zero: Parameter | None, sentence: str, advice: str, where: dict[str, object]
+) -> Candidate:
+    own = (share,) if zero is None else (share, zero)
+    told = sentence.replace("{felt}", str(where["felt"]))
+    return Candidate("unknown", own, told, advice, where, name_in_result="sensitivity")
