@@ -42,6 +42,7 @@ class AtRest:
 
     promise: Promise  # gain: log evidence, nats, over that of the model without it, as one place of many
     theta: NDArray[np.float64]  # (p,) the problem's parameters with it in
+    settles: bool  # whether the rig at rest is explained with it, to the noise
 
 
 def at_rest(
@@ -73,7 +74,7 @@ def at_rest(
             named = wide.bench.parameters.named(fitted.point.theta)
             gain -= float(np.log(candidate.places))
             promise = Promise(candidate, gain, {q.name: named[q.name] for q in candidate.parameters})
-            out.append(AtRest(promise, carried(still, wide, fitted.point).theta))
+            out.append(AtRest(promise, carried(still, wide, fitted.point).theta, _quiet(wide, fitted)))
     out.sort(key=lambda a: -a.promise.gain)
     before: Counter[str] = Counter()
     few: list[AtRest] = []

@@ -43,6 +43,7 @@ def named(
     fallback: Explained | None = None
     uneven: tuple[Problem, Evaluation] | None = None  # pieces with an effect in that lack more
     led = False  # what is in the model waits for another one
+    next_one: Trials | None = None  # ... which is fitted already
     origin = search.forked()
     lawful: Callable[[], Explained | None] | None = None  # what tells whether a law explains it all instead
     for step in range(MOST_EFFECTS):
@@ -50,7 +51,7 @@ def named(
             break
         left = compatible(candidates, [t.candidate for t in search.found])
         at = (step + 0.5) / (MOST_EFFECTS + 1)
-        tried = trials(
+        tried = next_one or trials(
             search.here,
             search.evaluation,
             left,
@@ -62,6 +63,7 @@ def named(
             law=None if step else law,
             guess=None if step or ideal.fitted.guess is None else ideal.fitted.guess.theta,
         )
+        next_one = Trials(list(tried.beside)) if tried.beside else None
         if tried.lawful is not None:
             return tried.lawful
         search.screened = None

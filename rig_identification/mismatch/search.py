@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve, still_promised
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
-from rig_identification.mismatch.at_rest import at_rest, from_rest
+from rig_identification.mismatch.at_rest import AtRest, at_rest, from_rest
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
@@ -32,7 +32,7 @@ from rig_identification.mismatch.first_fits import (
     leading,
     shows,
 )
-from rig_identification.mismatch.hypotheses import as_likely, count_of, worth_a_fit
+from rig_identification.mismatch.hypotheses import as_likely, compatible, count_of, worth_a_fit
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
@@ -100,6 +100,7 @@ class Trials:
     lawful: Explained | None = None  # what explains the session instead
     led: bool = False  # the first leads to another one, with which nothing is left
     chief: bool = True  # whether the first takes the larger part of what was left away
+    beside: tuple[Trial, ...] = ()  # what it leads to, where that is fitted already
 
 
 def trials(
@@ -143,8 +144,9 @@ def trials(
         look.outright()
         if not look.enough:
             look.at_rest()
-            if more and look.certain is not None:
-                return Trials(look.told([look.certain]), led=True)
+            if more and look.certain:
+                told = look.told(look.certain)
+                return Trials(told, led=True, beside=look.beside.get(told[0].candidate.label, ()))
         if not look.enough:
             look.from_nothing_bent(guess)
     lead = look.leading() if more else None
@@ -189,7 +191,8 @@ class _Look:
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
-    certain: Trial | None = None  # what rest asks for and the motion confirms, beside something else
+    certain: list[Trial] = field(default_factory=list)  # what rest asks for, beside something that moves
+    beside: dict[str, tuple[Trial, ...]] = field(default_factory=dict)  # that something else, by label
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
@@ -263,8 +266,7 @@ class _Look:
         """What the static recordings ask for by themselves, started where they have it.
 
         What explains them about as well as one that leaves only noise gets its turn beside it: an upper hinge
-        that is off is alike to a ceiling off level. What rest asks for, and takes nearly all of the motion's
-        residual away, and leaves too much for noise, is certain: what is left is another effect's.
+        that is off is alike to a ceiling off level.
         """
         self.notify("what rest asks for")
         asked = at_rest(self.here, self.seen, self.candidates, self.budget)[:MOST]
@@ -273,17 +275,50 @@ class _Look:
             if self.budget.spent() or (self.at_noise and behind > BEATEN):
                 break
             start = from_rest(self.here, self.seen, found)
-            if start is None:
-                continue
+            starts = [self.seen] if start is None else [start, self.seen]
             self.notify(found.promise.candidate.label)
-            trial = attempt(self.here, start, found.promise, self.budget)
+            trial, _ = best_of(self.here, starts, found.promise, self.budget)
             if trial is not None:
                 self.tried.append(trial)
-        first = max(self.tried, key=lambda t: t.evidence, default=None)
-        if first is None or self.enough or excess(first.evaluation) > (1.0 - DIRECT) * excess(self.seen):
-            return
-        if any(a.promise.candidate is first.candidate and a.promise.gain > BEATEN for a in asked):
-            self.certain = self.finished(first)
+        if not self.enough:
+            self.certain = self._certain(asked)
+
+    def _certain(self, asked: list[AtRest]) -> list[Trial]:
+        """What rest asks for beyond doubt beside another effect of the motion, likeliest first.
+
+        One that takes nearly all of the motion's residual away, and leaves too much for noise, is certain by
+        itself. Of those with which all is quiet at rest one is right. The motion tells which, once what it
+        has besides is in the model: where one more effect leaves only noise they are as likely as with it.
+        """
+        sure = {id(a.promise.candidate): a for a in asked if a.promise.gain > BEATEN}
+        alike = sorted((t for t in self.tried if id(t.candidate) in sure), key=lambda t: -t.evidence)
+        if not alike:
+            return []
+        least = (1.0 - DIRECT) * excess(self.seen)
+        if excess(alike[0].evaluation) <= least:
+            first = self.finished(alike[0])
+            return [] if first is None else [first]
+        settled = [t for t in alike if sure[id(t.candidate)].settles]
+        ended = [t for t in map(self.finished, settled) if t is not None]
+        if not ended:
+            return []
+        ended.sort(key=lambda t: -t.evidence)
+        self.notify(f"{ended[0].candidate.label}, and one more")
+        others = compatible(self.candidates, [ended[0].candidate])
+        promises = screen(ended[0].problem, ended[0].evaluation, others, self.mass)
+        if not promises or promises[0].share < DIRECT:
+            return []
+        sought = promises[0].candidate
+        out = []
+        for trial in ended:
+            if self.budget.spent() or not compatible([sought], [trial.candidate]):
+                continue
+            self.notify(f"{trial.candidate.label}, and {sought.label}")
+            second = attempt(trial.problem, trial.evaluation, promises[0], self.budget)
+            if second is not None and at_noise(second):
+                out.append(replace(trial, evidence=second.evidence))
+                self.beside[trial.candidate.label] = (second,)
+        return out
 
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
