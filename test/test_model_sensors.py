@@ -146,3 +146,15 @@ def test_jacobians_of_the_rotation_group(size: float) -> None:
     right = log(base * Rotation.from_rotvec(d)) - log(base * Rotation.from_rotvec(-d))
     np.testing.assert_allclose(inverse_right_jacobian(phi[None])[0] @ d, right / 2.0, atol=1e-13)
     np.testing.assert_allclose(skew(phi) @ d, np.cross(phi, d), atol=1e-18)
+
+
+@pytest.mark.parametrize("settling", [0.0, 1e-6, 0.3, -0.05])
+def test_drift(settling: float) -> None:
+    time, device = np.linspace(0.0, 40.0, 9), np.array([0.5, settling, -0.2, 0.1])
+    values, derivatives = sensors.drift(time, device)
+    fine = np.linspace(0.0, 40.0, 40001)
+    rate = 0.5 * np.exp(-settling * fine)
+    moved = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(fine))])
+    np.testing.assert_allclose(values[:, 0], np.interp(time, fine, moved), rtol=1e-6, atol=1e-9)
+    numeric = slope(lambda d: sensors.drift(time, d)[0], device)
+    np.testing.assert_allclose(derivatives, numeric, rtol=1e-5, atol=1e-5)

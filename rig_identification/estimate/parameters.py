@@ -83,23 +83,61 @@ class DeviceLayout:
         return 0
 
     def load_cell(self, cable: str) -> int:
-        """First entry of one cable's load cell."""
-        return self.load_cells + devices.load_cell_size(len(self.cables)) * self.cables.index(cable)
+        """First entry of one cable's load cell: its numbers, and its drift."""
+        return self.load_cells + self._a_cell * self.cables.index(cable)
+
+    @property
+    def _a_cell(self) -> int:
+        return devices.load_cell_size(len(self.cables)) + devices.DRIFT_SIZE
+
+    def own(self, device: str) -> slice:
+        """Entries of what a device's reading (model/sensors.py) depends on, less its drift."""
+        first = self.first(device)
+        return slice(first, first + self._size(device))
+
+    def drift(self, device: str) -> slice:
+        """Entries of a device's drift (sensors.drift); of motion capture there is none."""
+        first = self.first(device) + self._size(device)
+        return slice(first, self._end(device))
+
+    def first(self, device: str) -> int:
+        """First entry of a device's numbers."""
+        match device:
+            case "imu":
+                return self.imu
+            case "inclinometer":
+                return self.inclinometer
+            case "mocap":
+                return self.mocap
+        return self.load_cell(device)
+
+    def _size(self, device: str) -> int:
+        fixed = {
+            "imu": devices.IMU_SIZE,
+            "inclinometer": devices.INCLINOMETER_SIZE,
+            "mocap": devices.MOCAP_SIZE,
+        }
+        return fixed[device] if device in fixed else devices.load_cell_size(len(self.cables))
+
+    def _end(self, device: str) -> int:
+        """Entry after a device's numbers and its drift."""
+        axes = {"imu": 6, "inclinometer": 2, "mocap": 0}.get(device, 1)
+        return self.first(device) + self._size(device) + devices.DRIFT_SIZE * axes
 
     @property
     def imu(self) -> int:
-        """First entry of the IMU: its numbers (model/sensors.py), then its clock offset."""
-        return devices.load_cell_size(len(self.cables)) * len(self.cables)
+        """First entry of the IMU: its numbers (model/sensors.py), its drift, its clock offset."""
+        return self._a_cell * len(self.cables)
 
     @property
     def inclinometer(self) -> int:
-        """First entry of the inclinometer: its numbers, then its clock offset."""
-        return self.imu + devices.IMU_SIZE + 1
+        """First entry of the inclinometer: its numbers, its drift, its clock offset."""
+        return self._end("imu") + 1
 
     @property
     def mocap(self) -> int:
         """First entry of motion capture: 12 numbers, then its clock offset."""
-        return self.inclinometer + devices.INCLINOMETER_SIZE + 1
+        return self._end("inclinometer") + 1
 
     @property
     def exciter_clock(self) -> int:
@@ -114,9 +152,9 @@ class DeviceLayout:
     def clock(self, device: str) -> int:
         """Entry of a device's clock offset."""
         fixed = {
-            "imu": self.imu + devices.IMU_SIZE,
-            "inclinometer": self.inclinometer + devices.INCLINOMETER_SIZE,
-            "mocap": self.mocap + devices.MOCAP_SIZE,
+            "imu": self._end("imu"),
+            "inclinometer": self._end("inclinometer"),
+            "mocap": self._end("mocap"),
             "exciter": self.exciter_clock,
         }
         return fixed[device] if device in fixed else self.exciter_clock + 1 + self.cables.index(device)

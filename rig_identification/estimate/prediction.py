@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.lag import lagged, unsettled
-from rig_identification.estimate.parameters import DeviceLayout, ParameterSet
+from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
@@ -84,34 +84,32 @@ def start_basis(model: RigModel, state: State) -> Array:
 
 
 def read_device(
-    bench: Bench, device: str, raw: Array, R: Array, own: Array, R_tracker_mean: Array | None = None
+    bench: Bench,
+    device: str,
+    raw: Array,
+    R: Array,
+    own: Array,
+    time: Array,
+    R_tracker_mean: Array | None = None,
 ) -> sensors.Reading:
     """Reading of one device at the nodes.
 
-    own: flat array of DeviceLayout. R_tracker_mean: see sensors.mocap.
+    own: flat array of DeviceLayout. time (N,): s after the recording's start; of a single row, when it was
+    measured. R_tracker_mean: see sensors.mocap.
     """
     rig, places = bench.rig, bench.parameters.places
+    numbers = own[places.own(device)]
+    if device == "mocap" and bench.mocap is not None and R_tracker_mean is not None:
+        return sensors.mocap(raw, R, bench.mocap, R_tracker_mean, numbers)
     if device == "imu" and rig.imu is not None:
         turn = Rotation.from_quat(rig.imu.orientation).as_matrix()
-        return sensors.imu(raw, rig.imu.position, turn, own[places.imu : places.imu + sensors.IMU_SIZE])
-    if device == "inclinometer" and rig.inclinometer is not None:
+        reading = sensors.imu(raw, rig.imu.position, turn, numbers)
+    elif device == "inclinometer" and rig.inclinometer is not None:
         turn = Rotation.from_quat(rig.inclinometer.orientation).as_matrix()
-        start = places.inclinometer
-        return sensors.inclinometer(raw, turn, own[start : start + sensors.INCLINOMETER_SIZE])
-    if device == "mocap" and bench.mocap is not None and R_tracker_mean is not None:
-        errors = own[places.mocap : places.mocap + sensors.MOCAP_SIZE]
-        return sensors.mocap(raw, R, bench.mocap, R_tracker_mean, errors)
-    cable, start = places.cables.index(device), places.load_cell(device)
-    size = sensors.load_cell_size(len(places.cables))
-    return sensors.load_cell(raw, cable, own[start : start + size])
-
-
-def device_start(places: DeviceLayout, device: str) -> int:
-    """First entry of a device's numbers in the flat array."""
-    fixed = {"imu": places.imu, "inclinometer": places.inclinometer, "mocap": places.mocap}
-    if device in fixed:
-        return fixed[device]
-    return places.load_cell(device)
+        reading = sensors.inclinometer(raw, turn, numbers)
+    else:
+        reading = sensors.load_cell(raw, places.cables.index(device), numbers)
+    return sensors.drifting(reading, time, own[places.drift(device)])
 
 
 @dataclass(frozen=True)
@@ -209,7 +207,7 @@ def _channel_rows(
     if start_only:
         return residual, jacobian, H, D
     device_columns, entries, scale = parameters.device_columns()
-    first = device_start(parameters.places, channel.device)
+    first = parameters.places.first(channel.device)
     last = first + reading.in_device.shape[2]
     # Of a device's numbers most are certain
     used = sorted({int(entry) for entry in entries if first <= entry < last})
@@ -277,6 +275,7 @@ def linearise_run(
     if not motion.complete:
         return None
     own = parameters.device(theta)
+    clock = run.offset + run.grid.step * np.arange(run.grid.nodes, dtype=np.float64)
     in_physics = parameters.physics_jacobian(theta)[: directions.size]
     starts = basis.shape[1]
     known = 0 if start_only else parameters.size
@@ -285,7 +284,7 @@ def linearise_run(
     for index, channel in enumerate(run.channels):
         if channel.device not in readings:
             readings[channel.device] = read_device(
-                bench, channel.device, motion.outputs, motion.R_world_body, own, run.R_tracker_mean
+                bench, channel.device, motion.outputs, motion.R_world_body, own, clock, run.R_tracker_mean
             )
         tau = float(own[parameters.places.lag(channel.device)])
         # What a late device shows was shaken by the force of earlier: to the nearest node

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.noise import noise_std
-from rig_identification.estimate.prediction import Bench, device_start, read_device
+from rig_identification.estimate.prediction import Bench, read_device
 from rig_identification.model import layout
 from rig_identification.model.body import point_inertia, six_elements
 from rig_identification.model.equilibrium import Rest, find_rest
@@ -17,6 +17,10 @@ from rig_identification.recording import Dummy, Recording, Series
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
+
+
+#: Instants that stand for a static recording's time.
+SPREAD = 33
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,7 @@ class RestChannel:
     mean: Array  # (w,)
     variance: Array  # (w,) of the mean
     noise: Array  # (w,) of one sample
+    time: Array  # (m,) s after the recording's start, spread over the samples' span
 
 
 @dataclass(frozen=True)
@@ -62,8 +67,9 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
     def add(device: str, quantity: str, unit: str, noise: str, series: Series, columns: slice) -> None:
         values = series.values
         std, _ = noise_std(rig, noise, series.time, values)
-        mean = np.mean(values, axis=0)
-        channels.append(RestChannel(device, quantity, unit, columns, mean, mean_variance(values, std), std))
+        mean, variance = np.mean(values, axis=0), mean_variance(values, std)
+        time = np.linspace(series.time[0], series.time[-1], SPREAD)
+        channels.append(RestChannel(device, quantity, unit, columns, mean, variance, std, time))
 
     for cable, series in recording.tension.items():
         add(cable, "tension", "N", "tension", series, slice(0, 1))
@@ -132,10 +138,10 @@ def linearise_rest(bench: Bench, evidence: RestEvidence, theta: Array, guess: St
     residuals, jacobians, predictions = [], [], []
     log_spread = 0.0
     for channel in evidence.channels:
-        reading = read_device(bench, channel.device, rest.outputs, R, own)
+        reading = read_device(bench, channel.device, rest.outputs, R, own, channel.time)
         predicted = reading.values[0, channel.columns]
         jacobian = reading.in_raw[0, channel.columns] @ rest.J[0] @ in_physics
-        first = device_start(parameters.places, channel.device)
+        first = parameters.places.first(channel.device)
         for column, entry, s in zip(device_columns, entries, scale, strict=True):
             if first <= entry < first + reading.in_device.shape[2]:
                 jacobian[:, column] += s * reading.in_device[0, channel.columns, entry - first]

@@ -79,8 +79,8 @@ def at_rest(
     before: Counter[str] = Counter()
     few: list[AtRest] = []
     for found in out:
-        before[found.promise.candidate.effect] += 1
-        if before[found.promise.candidate.effect] <= ALIKE:
+        before[found.promise.candidate.kind] += 1
+        if before[found.promise.candidate.kind] <= ALIKE:
             few.append(found)
     return few
 

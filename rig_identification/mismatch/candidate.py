@@ -43,6 +43,11 @@ class Candidate:
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property
+    def kind(self) -> str:
+        """What its places share: the effect, or the law of a reading that the contract has no word for."""
+        return f"{self.effect} {self.where.get('law', '')}".strip()
+
+    @property
     def doubted(self) -> bool:
         """Whether the lab doubts these numbers itself: nothing is added to the model."""
         return all(p.freed for p in self.parameters)

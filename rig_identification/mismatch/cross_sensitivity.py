@@ -10,7 +10,6 @@ from __future__ import annotations
 from itertools import permutations, product
 
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
-from rig_identification.estimate.prediction import device_start
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.sensor_errors import RANGE, freed
 from rig_identification.model import sensors
@@ -21,6 +20,9 @@ from rig_identification.rig import Rig
 SHARE = 0.05
 FELT_FORCE = 0.005
 
+#: What such a law is called.
+FEELS = "cross-sensitivity"
+
 _AXES = [("gyroscope", a) for a in AXES] + [("accelerometer", a) for a in AXES]
 _QUANTITY = {"gyroscope": "angular_rate", "accelerometer": "specific_force"}
 
@@ -30,7 +32,7 @@ def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) ->
     out = []
     cells = [c.name for c in rig.cables if c.name in devices]
     for cell, other in permutations(cells, 2):
-        entry = device_start(parameters.places, cell) + sensors.LOAD_CELL_OWN
+        entry = parameters.places.first(cell) + sensors.LOAD_CELL_OWN
         entry += parameters.places.cables.index(other)
         zero = freed(parameters, f"{cell}.load_cell_zero", RANGE["load_cell_zero"])
         out.append(
@@ -39,7 +41,7 @@ def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) ->
                 zero,
                 "The load cell of {channel} feels {felt} as well: it reads {value} of that load too much.",
                 "Look for what the two share: amplifier, cable, bracket. Load one cell at a time.",
-                {"channel": cell, "axis": None, "quantity": "tension", "felt": other},
+                {"channel": cell, "axis": None, "quantity": "tension", "law": FEELS, "felt": other},
             )
         )
     if "imu" in devices:
@@ -49,7 +51,7 @@ def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) ->
 
 def _imu(parameters: ParameterSet) -> list[Candidate]:
     out = []
-    start = device_start(parameters.places, "imu") + sensors.IMU_OWN
+    start = parameters.places.first("imu") + sensors.IMU_OWN
     for (i, (unit, axis)), (j, (other, felt)) in product(enumerate(_AXES), repeat=2):
         if i == j or (unit, other) == ("accelerometer", "gyroscope"):
             # What an accelerometer feels of a turn is where it sits
@@ -67,7 +69,13 @@ def _imu(parameters: ParameterSet) -> list[Candidate]:
                 bias,
                 f"The {unit}'s {axis} axis feels the {other}'s {felt} axis as well: {{value}} of that.",
                 "Calibrate the unit's cross-axis terms on a turntable and in six positions, or replace it.",
-                {"channel": "imu", "axis": axis, "quantity": _QUANTITY[unit], "felt": f"{other} {felt}"},
+                {
+                    "channel": "imu",
+                    "axis": axis,
+                    "quantity": _QUANTITY[unit],
+                    "law": FEELS,
+                    "felt": f"{other} {felt}",
+                },
             )
         )
     return out

@@ -23,10 +23,10 @@ def effects_of(findings: Sequence[Finding]) -> str:
 
 
 def _called(found: Finding) -> str:
-    channel, felt = found.where.get("channel"), found.where.get("felt")
+    channel, law = found.where.get("channel"), found.where.get("law")
     if found.effect != "unknown" or not channel:
         return found.effect
-    return f"what bends {channel}" if felt is None else f"what {channel} feels of {felt}"
+    return f"what bends {channel}" if law is None else f"a {law} of {channel}"
 
 
 def finding(

@@ -14,6 +14,7 @@ from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
+from rig_identification.mismatch.drifts import drifts
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.riders import SWINGS
@@ -40,12 +41,18 @@ def catalogue(problem: Problem) -> list[Candidate]:
         *sensor_errors(rig, parameters, devices_of(problem)),
         *bent_cells(rig, parameters, mass),
         *cross_sensitivity(rig, parameters, devices_of(problem)),
+        *drifts(parameters, devices_of(problem), longest(problem)),
         *rig_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]
     # What is slow has several descriptions and one place
-    places = Counter(c.effect for c in every if not c.slow)
-    return [c if c.slow else replace(c, places=places[c.effect]) for c in every]
+    places = Counter(c.kind for c in every if not c.slow)
+    return [c if c.slow else replace(c, places=places[c.kind]) for c in every]
+
+
+def longest(problem: Problem) -> float:
+    """Duration (s) of the longest recording that is fitted."""
+    return max((run.recording.duration for run in problem.runs), default=0.0)
 
 
 def compatible(candidates: list[Candidate], found: list[Candidate]) -> list[Candidate]:
@@ -88,7 +95,7 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
         worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
     out: list[Promise] = []
     for p in worthy:
-        alike = sum(q.candidate.effect == p.candidate.effect for q in out)
+        alike = sum(q.candidate.kind == p.candidate.kind for q in out)
         most = ALIKE_IF_MANY if p.candidate.many else ALIKE
         # A hose's nine numbers promise more of anything, and take no place from what is fitted in a second
         others = out if p.candidate.slow else [q for q in out if not q.candidate.slow]
@@ -108,10 +115,10 @@ def as_likely(promises: list[Promise], worthy: list[Promise], meant: float) -> l
         return promise.gain - float(np.log(promise.candidate.places))
 
     least = max(map(likely, worthy), default=np.inf) - meant
-    seen = {p.candidate.effect for p in worthy}
+    seen = {p.candidate.kind for p in worthy}
     out: list[Promise] = []
     for p in promises:
-        if p.candidate.effect not in seen and not p.candidate.slow and likely(p) > least:
-            seen.add(p.candidate.effect)
+        if p.candidate.kind not in seen and not p.candidate.slow and likely(p) > least:
+            seen.add(p.candidate.kind)
             out.append(p)
     return out

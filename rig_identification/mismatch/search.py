@@ -290,12 +290,12 @@ class _Look:
         itself. Of those with which all is quiet at rest one is right. The motion tells which, once what it
         has besides is in the model: where one more effect leaves only noise they are as likely as with it.
         """
-        sure = {id(a.promise.candidate): a for a in asked if a.promise.gain > BEATEN}
+        least = max(BEATEN, max((a.promise.gain for a in asked), default=0.0) - BEATEN)
+        sure = {id(a.promise.candidate): a for a in asked if a.promise.gain > least}
         alike = sorted((t for t in self.tried if id(t.candidate) in sure), key=lambda t: -t.evidence)
         if not alike:
             return []
-        least = (1.0 - DIRECT) * excess(self.seen)
-        if excess(alike[0].evaluation) <= least:
+        if excess(alike[0].evaluation) <= (1.0 - DIRECT) * excess(self.seen):
             first = self.finished(alike[0])
             return [] if first is None else [first]
         settled = [t for t in alike if sure[id(t.candidate)].settles]

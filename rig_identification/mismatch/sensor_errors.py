@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
-from rig_identification.estimate.prediction import device_start
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.rig import Rig
 
@@ -95,7 +94,7 @@ def bent_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidat
         if any(p is None for p in line):
             continue
         name, std = f"{cable.name}.load_cell_curve", RANGE["load_cell_curve"] / share
-        entry = device_start(parameters.places, cable.name) + 2
+        entry = parameters.places.first(cable.name) + 2
         curve = Parameter(name, "1/N", 0.0, std, "device", entry, bounded=False)
         out.append(
             Candidate(
@@ -103,7 +102,7 @@ def bent_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidat
                 (curve, *(p for p in line if p is not None)),
                 "The load cell of {channel} is not straight: its reading bends by {value} times the load.",
                 "Calibrate the cell at several loads over its range, or replace it.",
-                {"channel": cable.name, "axis": None, "quantity": "tension"},
+                {"channel": cable.name, "axis": None, "quantity": "tension", "law": "curvature"},
                 name_in_result="curvature",
             )
         )

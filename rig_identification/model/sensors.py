@@ -55,6 +55,48 @@ def _mixed(pure: Reading, shares: Array) -> Reading:
     return Reading(own.values, own.in_raw, in_device)
 
 
+#: drift, of each axis: rate, unit/s, and how fast it settles, 1/s
+DRIFT_SIZE = 2
+#: Below this change over the time asked for a drift is as good as a straight line.
+STRAIGHT = 1e-4
+
+
+def drift(time: Array, device: Array) -> tuple[Array, Array]:
+    """What the zeros of a device's axes have moved by (N, w), and the derivatives (N, w, 2 w) in ``device``.
+
+    time (N,): s after a recording's start. device (2 w,): of each axis the rate r at first, unit/s, and how
+    fast k it settles, 1/s. A part that warms up towards its surroundings moves by r (1 - exp(-k t)) / k;
+    where it does not settle within the recording, by r t.
+    """
+    width = device.size // DRIFT_SIZE
+    values = np.zeros((time.size, width))
+    derivatives = np.zeros((time.size, width, device.size))
+    for axis in range(width):
+        rate, k = device[DRIFT_SIZE * axis : DRIFT_SIZE * (axis + 1)]
+        x = k * time
+        straight = np.abs(x) < STRAIGHT
+        safe = np.where(straight, 1.0, x)
+        fading = np.exp(-x)
+        shape = time * np.where(straight, 1.0 - 0.5 * x, (1.0 - fading) / safe)
+        bend = time**2 * np.where(straight, x / 3.0 - 0.5, (fading * (1.0 + x) - 1.0) / safe**2)
+        values[:, axis] = rate * shape
+        derivatives[:, axis, DRIFT_SIZE * axis] = shape
+        derivatives[:, axis, DRIFT_SIZE * axis + 1] = rate * bend
+    return values, derivatives
+
+
+def drifting(reading: Reading, time: Array, device: Array) -> Reading:
+    """A reading whose zeros move with time (:func:`drift`); one of the mean where it has a single row.
+
+    The derivatives in ``device`` come after the device's other numbers.
+    """
+    values, own = drift(time, device)
+    if reading.values.shape[0] == 1:
+        values, own = np.mean(values, axis=0, keepdims=True), np.mean(own, axis=0, keepdims=True)
+    in_device = np.concatenate([reading.in_device, own], axis=2)
+    return Reading(reading.values + values, reading.in_raw, in_device)
+
+
 #: load_cell: gain error 1, zero N, curve 1/N; then the share of each cable's tension that it feels
 LOAD_CELL_OWN = 3
 

@@ -40,21 +40,16 @@ class Mounts:
 
     def _read(self, device: str, outputs: Array, R_world_body: Array, own: Array) -> sensors.Reading:
         rig, places = self.rig, self.places
+        numbers = own[places.own(device)]
         if device == "imu" and rig.imu is not None:
             turn = Rotation.from_quat(rig.imu.orientation).as_matrix()
-            return sensors.imu(
-                outputs, rig.imu.position, turn, own[places.imu : places.imu + sensors.IMU_SIZE]
-            )
+            return sensors.imu(outputs, rig.imu.position, turn, numbers)
         if device == "inclinometer" and rig.inclinometer is not None:
             turn = Rotation.from_quat(rig.inclinometer.orientation).as_matrix()
-            start = places.inclinometer
-            return sensors.inclinometer(outputs, turn, own[start : start + sensors.INCLINOMETER_SIZE])
+            return sensors.inclinometer(outputs, turn, numbers)
         if device == "mocap":
-            errors = own[places.mocap : places.mocap + sensors.MOCAP_SIZE]
-            return sensors.mocap(outputs, R_world_body, self.mocap, self.R_tracker_mean, errors)
-        cable, start = places.cables.index(device), places.load_cell(device)
-        size = sensors.load_cell_size(len(places.cables))
-        return sensors.load_cell(outputs, cable, own[start : start + size])
+            return sensors.mocap(outputs, R_world_body, self.mocap, self.R_tracker_mean, numbers)
+        return sensors.load_cell(outputs, places.cables.index(device), numbers)
 
     @property
     def mocap(self) -> sensors.MocapMount:

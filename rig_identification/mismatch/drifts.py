@@ -1,0 +1,66 @@
+"""Zeros that move while a recording lasts, which the contract's table has no word for.
+
+A load cell, an amplifier, a gyroscope that warms up: each recording's zero is what it was when the recording
+began, and moves at a rate that may settle (model/sensors.drift). What moves differently in each recording is
+no law: the held-out run refutes it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
+from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.model import sensors
+
+#: Axes of a device that may drift: what they measure, its unit, and a plausible rate (std of the prior).
+CELL = (("tension", None, "N", 2.0),)
+IMU = (
+    *(("angular_rate", a, "rad/s", 5e-4) for a in AXES),
+    *(("specific_force", a, "m/s^2", 5e-3) for a in AXES),
+)
+INCLINOMETER = tuple(("inclination", a, "rad", 5e-4) for a in "xy")
+#: How fast drifts settle, 1/s: from hardly within a recording to within seconds.
+SETTLING, SETTLING_SPREAD = 0.05, 0.1
+
+
+def drifts(parameters: ParameterSet, devices: list[str], duration: float) -> list[Candidate]:
+    """What each axis of the ``devices`` may drift by. duration: s, of a recording."""
+    fixed = {"imu": IMU, "inclinometer": INCLINOMETER}
+    out = []
+    for device in devices:
+        cell = CELL if device in parameters.places.cables else ()
+        start = parameters.places.drift(device).start if device in fixed or cell else 0
+        for i, (quantity, axis, unit, std) in enumerate(fixed.get(device, cell)):
+            out.append(
+                _drift(device, quantity, axis, unit, std, start + sensors.DRIFT_SIZE * i, duration),
+            )
+    return out
+
+
+def _drift(
+    device: str, quantity: str, axis: str | None, unit: str, std: float, entry: int, duration: float
+) -> Candidate:
+    name = f"{device}.drift" if axis is None else f"{device}.{quantity}.drift.{axis}"
+    rate = Parameter(name, f"{unit}/s", 0.0, std, "device", entry, bounded=False)
+    settling = Parameter(
+        f"{name}.settling", "1/s", SETTLING, SETTLING_SPREAD, "device", entry + 1, bounded=False
+    )
+
+    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+        numbers = np.array([values[rate.name], values[settling.name]])
+        moved, slopes = sensors.drift(np.array([duration]), numbers)
+        return {
+            "drift": (float(moved[0, 0]), float(slopes[0, 0, 0] * stds[rate.name]), unit),
+            "settling_rate": (values[settling.name], stds[settling.name], "1/s"),
+        }
+
+    which = f"{quantity.replace('_', ' ')} {axis or ''}".strip()
+    return Candidate(
+        "unknown",
+        (rate, settling),
+        f"The zero of {{channel}}'s {which} drifts: by {{value}} in {duration:.3g} s.",
+        "Let it warm up before recording, and zero it then.",
+        {"channel": device, "axis": axis, "quantity": quantity, "law": "drift"},
+        tell=told,
+    )
