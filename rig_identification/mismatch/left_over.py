@@ -49,8 +49,10 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         if pieces is not None:
             # What is not told must not take part of the missing wrench away
             here, evaluation = pieces[0], pieces[1] or evaluation
-    # What knocks at the body moves all witnesses: where all but one device agree, nothing does
-    loose = _something_loose(ideal, best, search, notify) if search.liar is None else None
+    # What knocks at the body moves all witnesses: where all but one device agree, nothing does. But a force
+    # at the exciter that is not known may be anything that acts on the body
+    knocks = search.liar in (None, "exciter")
+    loose = _something_loose(ideal, best, search, notify) if knocks else None
     if loose is not None:
         kept, fitted = loose
         explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
