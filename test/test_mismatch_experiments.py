@@ -16,6 +16,11 @@ def test_every_effect_of_the_contract_has_an_experiment(effect: str) -> None:
     assert len(experiment_for(effect).split()) > 3
 
 
+@pytest.mark.parametrize("law", ["curvature", "cross-sensitivity", "drift"])
+def test_every_law_of_a_reading_has_one_of_its_own(law: str) -> None:
+    assert len(experiment_for(f"unknown {law}").split()) > 3
+
+
 def test_an_alternative_is_written_out() -> None:
     entry: dict[str, object] = {
         "effect": "air_added_mass",

@@ -13,7 +13,7 @@ _TWO_AMPLITUDES = (
 _KNOWN_WEIGHT = "hang a known weight on that cable alone: a scale error grows with it, an offset does not"
 _SUNK = "measure how far hinges and ceiling sink under a known weight"
 
-#: By the effect's name in the recording contract.
+#: By the effect's name in the recording contract, and the law of a reading that it has no word for.
 _EXPERIMENTS = {
     "imu_bias": "average the IMU at rest, turned by 180 degrees about one axis after the other",
     "imu_scale": "hold the IMU against gravity in six positions, and turn it by a known angle",
@@ -44,9 +44,12 @@ _EXPERIMENTS = {
     "tether": "take off one hose and wire after the other and repeat",
     "external_force": "repeat the run: a push does not come again at the same instant",
     "unknown": "repeat at another amplitude, and at two frequencies",
+    "unknown curvature": "load that cell alone, with several known weights over its range",
+    "unknown cross-sensitivity": "load one cell, or turn and tilt about one axis, alone: no other reads it",
+    "unknown drift": "leave all at rest for as long as a recording takes: what drifts does so by itself",
 }
 
 
-def experiment_for(effect: str) -> str:
-    """What to do to tell ``effect`` from its rivals; empty where nothing is known."""
-    return _EXPERIMENTS.get(effect, "")
+def experiment_for(kind: str) -> str:
+    """What to do to tell a kind of effect (Candidate.kind) from its rivals; empty where nothing is known."""
+    return _EXPERIMENTS.get(kind, "")

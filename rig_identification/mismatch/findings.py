@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,15 @@ Array = NDArray[np.float64]
 
 
 def effects_of(findings: Sequence[Finding]) -> str:
-    """Effects by name; what the contract's table has no word for, by where it is."""
-    return ", ".join(map(_called, findings))
+    """Effects by name; what the contract's table has no word for, by its law and where it is."""
+    return ", ".join(called(f.effect, f.where) for f in findings)
 
 
-def _called(found: Finding) -> str:
-    channel, law = found.where.get("channel"), found.where.get("law")
-    if found.effect != "unknown" or not channel:
-        return found.effect
+def called(effect: str, where: Mapping[str, object]) -> str:
+    """An effect by name; what the contract's table has no word for, by its law and where it is."""
+    channel, law = where.get("channel"), where.get("law")
+    if effect != "unknown" or not channel:
+        return effect
     return f"what bends {channel}" if law is None else f"a {law} of {channel}"
 
 
@@ -68,7 +69,7 @@ def rival(trial: Trial, gap: float) -> dict[str, object]:
         "where": dict(trial.candidate.where),
         "log_likelihood_gap": float(gap),
         "parameters": written(trial.candidate.told(values, stds)),
-        "experiment": experiment_for(trial.candidate.effect),
+        "experiment": experiment_for(trial.candidate.kind),
     }
 
 

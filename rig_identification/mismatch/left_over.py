@@ -12,7 +12,7 @@ from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
-from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -43,7 +43,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         partly = [rival(t, 0.0) for t in search.found]
         rivals = (*partly, *search.rivals)
         if partly:
-            named = ", ".join(str(p["effect"]) for p in partly)
+            named = ", ".join(called(t.candidate.effect, t.candidate.where) for t in search.found)
             explanation += f" {named} would take away a part of it, which does not convince."
         pieces = short_pieces(ideal) if search.found else None
         if pieces is not None:

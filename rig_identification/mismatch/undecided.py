@@ -26,7 +26,7 @@ from rig_identification.estimate.verdict import DOUBTED
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import (
     Trial,
@@ -115,7 +115,7 @@ def _neither_shown_nor_excluded(
     for promise in sorted(close, key=trails)[:ASKED]:
         if len(stated) == STATED:
             break
-        if any(t.candidate.effect == promise.candidate.effect for _, t in stated):
+        if any(t.candidate.kind == promise.candidate.kind for _, t in stated):
             # Its other places are its rivals anyway
             continue
         notify(f"search: {promise.candidate.label}, which may be there", 0.5)
@@ -130,7 +130,9 @@ def _neither_shown_nor_excluded(
 
 
 def _sentence(stated: list[tuple[float, Trial]]) -> str:
-    named = " and ".join(dict.fromkeys(trial.candidate.effect for _, trial in stated))
+    named = " and ".join(
+        dict.fromkeys(called(trial.candidate.effect, trial.candidate.where) for _, trial in stated)
+    )
     return f"Whether there is {named} they neither show nor exclude."
 
 
