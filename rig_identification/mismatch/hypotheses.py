@@ -12,6 +12,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.amounts import WORTH
+from rig_identification.mismatch.bent_cells import bent_cells
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
 from rig_identification.mismatch.drifts import drifts
@@ -20,7 +21,7 @@ from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
-from rig_identification.mismatch.sensor_errors import bent_cells, sensor_errors
+from rig_identification.mismatch.sensor_errors import sensor_errors
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3

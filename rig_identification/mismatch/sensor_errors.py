@@ -13,7 +13,6 @@ from rig_identification.rig import Rig
 RANGE = {
     "load_cell_gain": 0.05,
     "load_cell_zero": 200.0,
-    "load_cell_curve": 0.05,  # of the reading, at the load's even share
     "gyroscope_bias": 0.05,
     "accelerometer_bias": 1.0,
     "gyroscope_scale": 0.05,
@@ -75,36 +74,6 @@ def _load_cells(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
             "The load cell of {channel} reads {value} at no load.",
             "Zero the cell while the cable hangs free.",
             where,
-        )
-    return out
-
-
-def bent_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidate]:
-    """Load cells whose reading is no straight line of the load, which the contract's table has no word for.
-
-    Gain and zero are free beside it: what line a bent cell was calibrated by is not known. mass: kg, roughly.
-    """
-    share = mass * rig.gravity / len(rig.cables)
-    out = []
-    for cable in rig.cables:
-        line = [
-            freed(parameters, f"{cable.name}.load_cell_{name}", RANGE[f"load_cell_{name}"])
-            for name in ("gain", "zero")
-        ]
-        if any(p is None for p in line):
-            continue
-        name, std = f"{cable.name}.load_cell_curve", RANGE["load_cell_curve"] / share
-        entry = parameters.places.first(cable.name) + 2
-        curve = Parameter(name, "1/N", 0.0, std, "device", entry, bounded=False)
-        out.append(
-            Candidate(
-                "unknown",
-                (curve, *(p for p in line if p is not None)),
-                "The load cell of {channel} is not straight: its reading bends by {value} times the load.",
-                "Calibrate the cell at several loads over its range, or replace it.",
-                {"channel": cable.name, "axis": None, "quantity": "tension", "law": "curvature"},
-                name_in_result="curvature",
-            )
         )
     return out
 

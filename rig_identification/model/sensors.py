@@ -98,7 +98,7 @@ def drifting(reading: Reading, time: Array, device: Array) -> Reading:
 
 
 #: load_cell: gain error 1, zero N, curve 1/N; then the share of each cable's tension that it feels
-LOAD_CELL_OWN = 3
+LOAD_CELL_CURVE, LOAD_CELL_OWN = 2, 3
 
 
 def load_cell_size(cables: int) -> int:
