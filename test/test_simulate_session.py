@@ -337,6 +337,31 @@ def test_a_devices_error_is_on_top_of_what_it_reads() -> None:
     assert wrong.tension["cable_1"].values == pytest.approx(plain.tension["cable_1"].values)
 
 
+def test_a_reading_may_follow_a_law_of_its_own() -> None:
+    run = RunSpec("run_1", 2.0, PULL)
+    laws = {
+        "cable_2.feels.cable_1": (0.1,),
+        "cable_1.drift": (3.0,),
+        "cable_1.drift.settling": (0.5,),
+        "imu.gyroscope.x.feels.accelerometer.z": (0.01,),
+    }
+    plain, wrong = recorded(car(run)), recorded(car(run, effects=laws))
+    assert wrong.imu.values[:, 0] == pytest.approx(plain.imu.values[:, 0] + 0.01 * plain.imu.values[:, 5])
+    assert wrong.imu.values[:, 1:] == pytest.approx(plain.imu.values[:, 1:], abs=1e-9)
+    first, second = plain.tension["cable_1"], plain.tension["cable_2"]
+    felt = np.interp(second.time, first.time, first.values[:, 0])
+    inside = (second.time > first.time[0]) & (second.time < first.time[-1])
+    more = wrong.tension["cable_2"].values[:, 0] - second.values[:, 0]
+    assert more[inside] == pytest.approx(0.1 * felt[inside], rel=1e-3)
+    moved = wrong.tension["cable_1"].values[:, 0] - first.values[:, 0]
+    assert moved == pytest.approx(6.0 * (1.0 - np.exp(-0.5 * first.time)), abs=0.05)
+
+
+def test_a_law_of_what_is_not_measured_is_refused() -> None:
+    with pytest.raises(InputError, match=r"effect cable_9.drift: is unknown"):
+        recorded(car(RunSpec("run_1", 2.0), effects={"cable_9.drift": (1.0,)}))
+
+
 def test_cables_that_stretch_start_where_they_hang() -> None:
     """Let go aside on elastic cables the body swings; it does not bounce by all of its stretch."""
     run = RunSpec("run_1", 2.0, PULL)
@@ -361,5 +386,6 @@ def test_effects_of_the_command_line_are_told_in_the_contracts_words() -> None:
     assert told["tether"] == {"tether": [100.0, 0.0, 0.0], "tether_point": [0.0, 0.0, 1.0]}
     assert effect_of("sprung_mass.position") == "sprung_mass"
     assert effect_of("imu.position.y") == "imu_position"
+    assert effect_of("imu.gyroscope.x.feels.accelerometer.z") == effect_of("cable_1.drift") == "unknown"
     with pytest.raises(InputError, match="--effect hinge_damping: give NAME=VALUE"):
         effects_given(["hinge_damping"])

@@ -40,6 +40,9 @@ def effect_of(name: str) -> str:
     """The contract's effect that a switch, or a device's error, belongs to."""
     first, _, rest = name.partition(".")
     kind = rest.partition(".")[0]
+    if {"feels", "drift", "load_cell_curve"} & set(rest.split(".")):
+        # A law of a reading, which the contract's table has no word for
+        return "unknown"
     if kind == "orientation":
         return "imu_misalignment" if first == "imu" else "inclinometer_offset"
     return _OF_SWITCH.get(first, _OF_DEVICE.get(kind, first) if first not in _WITH_PARTS else first)

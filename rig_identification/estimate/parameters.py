@@ -100,6 +100,33 @@ class DeviceLayout:
         first = self.first(device) + self._size(device)
         return slice(first, self._end(device))
 
+    def laws(self) -> dict[str, int]:
+        """Entries, by name, of what a reading may follow beside gains and zeros (model/sensors.py).
+
+        ``cable_1.load_cell_curve``, ``cable_1.feels.cable_2``, ``imu.gyroscope.x.feels.accelerometer.y``, and
+        ``cable_1.drift``, ``imu.angular_rate.drift.x``, each with ``.settling``.
+        """
+        out: dict[str, int] = {}
+        drifting = {c: [f"{c}.drift"] for c in self.cables}
+        for cable in self.cables:
+            out[f"{cable}.load_cell_curve"] = self.load_cell(cable) + devices.LOAD_CELL_CURVE
+            for i, other in enumerate(self.cables):
+                if other != cable:
+                    out[f"{cable}.feels.{other}"] = self.load_cell(cable) + devices.LOAD_CELL_OWN + i
+        axes = [(unit, a) for unit in ("gyroscope", "accelerometer") for a in AXES]
+        for i, (unit, axis) in enumerate(axes):
+            for j, (other, felt) in enumerate(axes):
+                if i != j:
+                    name = f"imu.{unit}.{axis}.feels.{other}.{felt}"
+                    out[name] = self.imu + devices.IMU_OWN + len(axes) * i + j
+        drifting["imu"] = [f"imu.{q}.drift.{a}" for q in ("angular_rate", "specific_force") for a in AXES]
+        drifting["inclinometer"] = [f"inclinometer.inclination.drift.{a}" for a in AXES[:2]]
+        for device, names in drifting.items():
+            for i, name in enumerate(names):
+                out[name] = self.drift(device).start + devices.DRIFT_SIZE * i
+                out[f"{name}.settling"] = out[name] + 1
+        return out
+
     def first(self, device: str) -> int:
         """First entry of a device's numbers."""
         match device:

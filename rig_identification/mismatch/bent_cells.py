@@ -8,7 +8,6 @@ from __future__ import annotations
 from rig_identification.estimate.parameters import Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.sensor_errors import RANGE, freed
-from rig_identification.model import sensors
 from rig_identification.rig import Rig
 
 #: Plausible share of the reading (std of the prior) by which a cell bends at the load's even share.
@@ -27,8 +26,7 @@ def bent_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candidat
         if any(p is None for p in line):
             continue
         name, std = f"{cable.name}.load_cell_curve", BENT / share
-        entry = parameters.places.first(cable.name) + sensors.LOAD_CELL_CURVE
-        curve = Parameter(name, "1/N", 0.0, std, "device", entry, bounded=False)
+        curve = Parameter(name, "1/N", 0.0, std, "device", parameters.places.laws()[name], bounded=False)
         out.append(
             Candidate(
                 "unknown",

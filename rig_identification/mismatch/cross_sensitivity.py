@@ -7,12 +7,11 @@ other. Each is one share, of one other reading, beside a zero that nobody has ta
 
 from __future__ import annotations
 
-from itertools import permutations, product
+from itertools import permutations
 
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.sensor_errors import RANGE, freed
-from rig_identification.model import sensors
 from rig_identification.rig import Rig
 
 #: Plausible range (std of the prior) of a share of a like quantity, and of what a gyroscope feels of specific
@@ -29,15 +28,14 @@ _QUANTITY = {"gyroscope": "angular_rate", "accelerometer": "specific_force"}
 
 def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
     """What one axis, or cell, may feel of another one of its device. devices: those that the runs hold."""
-    out = []
+    out, laws = [], parameters.places.laws()
     cells = [c.name for c in rig.cables if c.name in devices]
     for cell, other in permutations(cells, 2):
-        entry = parameters.places.first(cell) + sensors.LOAD_CELL_OWN
-        entry += parameters.places.cables.index(other)
+        name = f"{cell}.feels.{other}"
         zero = freed(parameters, f"{cell}.load_cell_zero", RANGE["load_cell_zero"])
         out.append(
             _felt(
-                Parameter(f"{cell}.feels.{other}", "1", 0.0, SHARE, "device", entry, bounded=False),
+                Parameter(name, "1", 0.0, SHARE, "device", laws[name], bounded=False),
                 zero,
                 "The load cell of {channel} feels {felt} as well: it reads {value} of that load too much.",
                 "Look for what the two share: amplifier, cable, bracket. Load one cell at a time.",
@@ -50,10 +48,9 @@ def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) ->
 
 
 def _imu(parameters: ParameterSet) -> list[Candidate]:
-    out = []
-    start = parameters.places.first("imu") + sensors.IMU_OWN
-    for (i, (unit, axis)), (j, (other, felt)) in product(enumerate(_AXES), repeat=2):
-        if i == j or (unit, other) == ("accelerometer", "gyroscope"):
+    out, laws = [], parameters.places.laws()
+    for (unit, axis), (other, felt) in permutations(_AXES, 2):
+        if (unit, other) == ("accelerometer", "gyroscope"):
             # What an accelerometer feels of a turn is where it sits
             continue
         alike = unit == other
@@ -65,7 +62,7 @@ def _imu(parameters: ParameterSet) -> list[Candidate]:
             bias = freed(parameters, f"imu.{unit}_bias.{axis}", RANGE[f"{unit}_bias"])
         out.append(
             _felt(
-                Parameter(name, kind, 0.0, std, "device", start + 6 * i + j, bounded=False),
+                Parameter(name, kind, 0.0, std, "device", laws[name], bounded=False),
                 bias,
                 f"The {unit}'s {axis} axis feels the {other}'s {felt} axis as well: {{value}} of that.",
                 "Calibrate the unit's cross-axis terms on a turntable and in six positions, or replace it.",

@@ -27,25 +27,27 @@ SETTLING, SETTLING_SPREAD = 0.05, 0.1
 def drifts(parameters: ParameterSet, devices: list[str], duration: float) -> list[Candidate]:
     """What each axis of the ``devices`` may drift by. duration: s, of a recording."""
     fixed = {"imu": IMU, "inclinometer": INCLINOMETER}
-    out = []
+    out, laws = [], parameters.places.laws()
     for device in devices:
         cell = CELL if device in parameters.places.cables else ()
-        start = parameters.places.drift(device).start if device in fixed or cell else 0
-        for i, (quantity, axis, unit, std) in enumerate(fixed.get(device, cell)):
-            out.append(
-                _drift(device, quantity, axis, unit, std, start + sensors.DRIFT_SIZE * i, duration),
+        for quantity, axis, unit, std in fixed.get(device, cell):
+            name = f"{device}.drift" if axis is None else f"{device}.{quantity}.drift.{axis}"
+            rate, settling = name, f"{name}.settling"
+            own = (
+                Parameter(rate, f"{unit}/s", 0.0, std, "device", laws[rate], bounded=False),
+                Parameter(
+                    settling, "1/s", SETTLING, SETTLING_SPREAD, "device", laws[settling], bounded=False
+                ),
             )
+            where: dict[str, object] = {"channel": device, "axis": axis, "quantity": quantity, "law": "drift"}
+            out.append(_drift(own, unit, duration, where))
     return out
 
 
 def _drift(
-    device: str, quantity: str, axis: str | None, unit: str, std: float, entry: int, duration: float
+    own: tuple[Parameter, Parameter], unit: str, duration: float, where: dict[str, object]
 ) -> Candidate:
-    name = f"{device}.drift" if axis is None else f"{device}.{quantity}.drift.{axis}"
-    rate = Parameter(name, f"{unit}/s", 0.0, std, "device", entry, bounded=False)
-    settling = Parameter(
-        f"{name}.settling", "1/s", SETTLING, SETTLING_SPREAD, "device", entry + 1, bounded=False
-    )
+    rate, settling = own
 
     def told(values: dict[str, float], stds: dict[str, float]) -> Told:
         numbers = np.array([values[rate.name], values[settling.name]])
@@ -55,12 +57,12 @@ def _drift(
             "settling_rate": (values[settling.name], stds[settling.name], "1/s"),
         }
 
-    which = f"{quantity.replace('_', ' ')} {axis or ''}".strip()
+    which = f"{str(where['quantity']).replace('_', ' ')} {where['axis'] or ''}".strip()
     return Candidate(
         "unknown",
-        (rate, settling),
+        own,
         f"The zero of {{channel}}'s {which} drifts: by {{value}} in {duration:.3g} s.",
         "Let it warm up before recording, and zero it then.",
-        {"channel": device, "axis": axis, "quantity": quantity, "law": "drift"},
+        where,
         tell=told,
     )

@@ -68,7 +68,7 @@ def watch_run(
 
     def sampled(device: str, mounts: Mounts, instant: Array) -> Array:
         nodes = mounts.read(device, motion.outputs, motion.R_world_body, true.device)
-        return at_instants(flight.grid, instant, nodes)
+        return at_instants(flight.grid, instant, nodes) + true.drifted(device, instant - watch.begin)
 
     return _watch(spec, true, motion.R_world_body[0], sampled, watch, rng)
 
@@ -80,7 +80,8 @@ def watch_rest(
     R = rest.state.R_world_body
 
     def sampled(device: str, mounts: Mounts, instant: Array) -> Array:
-        return np.repeat(mounts.read(device, rest.outputs, R[None], true.device), instant.size, axis=0)
+        still = mounts.read(device, rest.outputs, R[None], true.device)
+        return np.repeat(still, instant.size, axis=0) + true.drifted(device, instant - watch.begin)
 
     return _watch(spec, true, R, sampled, watch, rng)
 

@@ -13,7 +13,7 @@ from rig_identification.errors import InputError
 from rig_identification.estimate.parameters import INERTIAL, UNKNOWN_ROTATION, ParameterSet, parameter_set
 from rig_identification.live.plant_effects import PlantEffects, with_effects
 from rig_identification.live.plant_switches import SWITCHES, effects_of
-from rig_identification.model import layout
+from rig_identification.model import layout, sensors
 from rig_identification.model.motion import RigModel, rig_model
 from rig_identification.rig import Rig
 from rig_identification.simulate.spec import SessionSpec
@@ -38,6 +38,13 @@ class TrueRig:
     def late(self, device: str) -> float:
         """By how much the stamps of a device are late, s."""
         return float(self.device[self.parameters.places.clock(device)])
+
+    def drifted(self, device: str, time: Array) -> Array:
+        """(N, w) what a device's zeros have moved by, ``time`` (N,) s after a recording's start."""
+        if device == "mocap":
+            return np.zeros((time.size, 1))
+        moved, _ = sensors.drift(time, self.device[self.parameters.places.drift(device)])
+        return moved
 
     @property
     def R_body_exciter(self) -> Array:
@@ -95,7 +102,9 @@ def _with_physics(true: TrueRig, spec: SessionSpec) -> TrueRig:
 def _with_device_errors(true: TrueRig, spec: SessionSpec) -> TrueRig:
     """The rig with its devices' errors."""
     device, values = true.device.copy(), dict(true.values)
-    errors = {p.name: p for p in true.parameters.free if p.kind == "device"}
+    errors = {p.name: p.index for p in true.parameters.free if p.kind == "device"}
+    measured = channels_of(spec)
+    errors |= {n: e for n, e in true.parameters.places.laws().items() if n.split(".")[0] in measured}
     for name, given in spec.effects.items():
         if name in _SWITCHED:
             continue
@@ -104,6 +113,6 @@ def _with_device_errors(true: TrueRig, spec: SessionSpec) -> TrueRig:
             raise InputError(f"effect {name}: is unknown; known are {known}")
         if len(given) != 1 or not np.isfinite(given[0]):
             raise InputError(f"effect {name}: give one finite number")
-        device[errors[name].index] += given[0]
-        values[name] += given[0]
+        device[errors[name]] += given[0]
+        values[name] = values.get(name, 0.0) + given[0]
     return replace(true, device=device, values=values)
