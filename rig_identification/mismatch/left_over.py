@@ -13,6 +13,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
+from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -49,9 +50,8 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         if pieces is not None:
             # What is not told must not take part of the missing wrench away
             here, evaluation = pieces[0], pieces[1] or evaluation
-    # What knocks at the body moves all witnesses: where all but one device agree, nothing does. But a force
-    # at the exciter that is not known may be anything that acts on the body
-    knocks = search.liar in (None, "exciter")
+    # What knocks at the body moves all witnesses: where all but one device agree, nothing does
+    knocks = search.liar in (None, DRIVE)
     loose = _something_loose(ideal, best, search, notify) if knocks else None
     if loose is not None:
         kept, fitted = loose

@@ -15,6 +15,8 @@ from rig_identification.estimate.growing import misfit, settled_starts
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, excess, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 
+#: What drives the motion: a device that measures a force, which without it may be any.
+DRIVE = "exciter"
 #: Factor on a device's noise that silences it, and on the exciter's.
 SILENT = 300.0
 #: Share of the excess that has to go with a device for it to be the one that lies.
@@ -37,7 +39,7 @@ class Liar:
 def devices_of(problem: Problem) -> list[str]:
     """Devices whose readings, or force, the runs hold."""
     found = {c.device: None for run in problem.runs for c in run.channels}
-    exciter = ["exciter"] if any(run.force is not None for run in problem.runs) else []
+    exciter = [DRIVE] if any(run.force is not None for run in problem.runs) else []
     return [*found, *exciter]
 
 
@@ -48,7 +50,7 @@ def silenced(problem: Problem, device: str) -> Problem:
         channels = tuple(
             replace(c, noise=SILENT * c.noise) if c.device == device else c for c in run.channels
         )
-        loud = SILENT if device == "exciter" else 1.0
+        loud = SILENT if device == DRIVE else 1.0
         runs.append(replace(run, channels=channels, exciter_noise=loud * run.exciter_noise))
     rests = tuple(
         replace(
@@ -100,7 +102,7 @@ def find_liar(problem: Problem, evaluation: Evaluation, budget: Budget = UNLIMIT
         if budget.spent():
             break
         # The force is no row, it drives everything: only a fit tells
-        if device != "exciter" and _gone_with(problem, evaluation, device) < GONE_LINEARLY:
+        if device != DRIVE and _gone_with(problem, evaluation, device) < GONE_LINEARLY:
             continue
         try:
             fitted, _ = solve(

@@ -10,7 +10,7 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.findings import pushed, written
 from rig_identification.mismatch.latent import MissingWrench, joined, missing_wrench, strongest_push
 from rig_identification.mismatch.law import law_of
-from rig_identification.mismatch.locate import Event
+from rig_identification.mismatch.locate import DRIVE, Event
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.model.motion import State
 from rig_identification.result import Finding
@@ -55,7 +55,10 @@ def push_finding(
 def unknown_finding(
     problem: Problem, evaluation: Evaluation, rest: State, mass: float, device: str | None
 ) -> Finding | None:
-    """Where, when and how strong whatever is left is, and the wrench over time that stands in its place."""
+    """Where, when and how strong whatever is left is, and the wrench over time that stands in its place.
+
+    device: without which everything else agrees, if there is one.
+    """
     squares = [float(np.sum(run.residual**2) - run.residual.size) for run in evaluation.runs]
     order = [int(i) for i in np.argsort(squares)[::-1][:3]]
     missing = missing_in(problem, evaluation, rest, mass, order)
@@ -69,6 +72,9 @@ def unknown_finding(
     moment = np.sqrt(np.mean((about - np.mean(about, axis=0)) ** 2, axis=0))
     axis = AXES[int(np.argmax(strength))]
     law = law_of(missing)
+    # A force at the exciter that nobody measured may be anything that acts on the body
+    driven = device == DRIVE
+    device = None if driven else device
     where: dict[str, object] = {"channel": device, "axis": axis}
     where["times"] = [
         {
@@ -87,6 +93,8 @@ def unknown_finding(
             f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
         )
         text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."
+        if driven:
+            text += " A force at the exciter beyond the measured one would account for it as well."
     std = float(push.std) if np.isfinite(push.std) else float(np.max(strength))
     turning = float(np.std(about[:, int(np.argmax(moment))]) / np.sqrt(max(1, about.shape[0])))
     told = {
