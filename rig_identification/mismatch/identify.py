@@ -24,6 +24,7 @@ from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explain import explain
+from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.watched import explain_watched
@@ -53,6 +54,8 @@ def identify(
 
     origins = near_origins(session.rig)
     session = session if origins.given else moved(session, origins)
+    lines = lines_at_rest(session)
+    session = without_lines(session, lines)
     found, ideal = _identified(session, notify, assumed)
     less = None
     if found.mismatch.verdict == "unexplained" and all(
@@ -63,7 +66,7 @@ def identify(
     if less is not None:
         rest, _ = _identified(less.session, notify, assumed)
         found = _without_unseen(found, rest, less.note)
-    found = replace(found, mismatch=with_overranges(found.mismatch, session))
+    found = replace(found, mismatch=with_lines(with_overranges(found.mismatch, session), lines))
     return found if origins.given else told(found, origins)
 
 
