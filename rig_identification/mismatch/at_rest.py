@@ -14,6 +14,7 @@ beforehand leaves less of it.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,8 @@ from rig_identification.mismatch.unbent import as_described, at_first
 ASIDE = (0.3, -0.3)
 #: Steps of a fit.
 STEPS = 10
+#: Nats within which rest tells next to nothing between two.
+CLOSE = 5.0
 #: Hypotheses of one effect that are told: its other places are its rivals anyway.
 ALIKE = 2
 
@@ -46,12 +49,18 @@ class AtRest:
 
 
 def at_rest(
-    problem: Problem, evaluation: Evaluation, candidates: list[Candidate], budget: Budget = UNLIMITED
+    problem: Problem,
+    evaluation: Evaluation,
+    candidates: list[Candidate],
+    budget: Budget = UNLIMITED,
+    promises: Sequence[Promise] = (),
 ) -> list[AtRest]:
     """Hypotheses that the static recordings ask for, likeliest first, a few of each effect.
 
     What changes the model is not asked. problem, evaluation: with effects found before, if any. Fits start
     about the same body in a rig as it is described. What comes after the ``budget`` is spent is not asked.
+    promises: of the motion. Of what rest tells next to nothing about, which of three neighbours a load cell
+    feels for one, those come first that the motion promises more of.
     """
     if not problem.rests:
         return []
@@ -75,7 +84,15 @@ def at_rest(
             gain -= float(np.log(candidate.places))
             promise = Promise(candidate, gain, {q.name: named[q.name] for q in candidate.parameters})
             out.append(AtRest(promise, carried(still, wide, fitted.point).theta, _quiet(wide, fitted)))
-    out.sort(key=lambda a: -a.promise.gain)
+    most = max((a.promise.gain for a in out), default=0.0)
+    moving = {p.candidate.label: p.gain for p in promises}
+
+    def order(found: AtRest) -> tuple[bool, float, float]:
+        close = most - found.promise.gain < CLOSE
+        told = moving.get(found.promise.candidate.label, 0.0) if close else 0.0
+        return not close, -told, -found.promise.gain
+
+    out.sort(key=order)
     before: Counter[str] = Counter()
     few: list[AtRest] = []
     for found in out:

@@ -269,9 +269,9 @@ class _Look:
         that is off is alike to a ceiling off level.
         """
         self.notify("what rest asks for")
-        asked = at_rest(self.here, self.seen, self.candidates, self.budget)[:MOST]
+        asked = at_rest(self.here, self.seen, self.candidates, self.budget, self.promises)[:MOST]
         for found in asked:
-            behind = asked[0].promise.gain - found.promise.gain
+            behind = max(a.promise.gain for a in asked) - found.promise.gain
             if self.budget.spent() or (self.at_noise and behind > BEATEN):
                 break
             start = from_rest(self.here, self.seen, found)
