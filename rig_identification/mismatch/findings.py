@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Told
 from rig_identification.mismatch.experiments import experiment_for
 from rig_identification.mismatch.trial import Trial
-from rig_identification.result import Finding
+from rig_identification.result import Finding, Mismatch
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,27 @@ def finding(
         dict(evidence),
         f"{sentence} {candidate.advice}",
     )
+
+
+#: Of what is told of readings before anything is fitted.
+NO_EVIDENCE: dict[str, float | None] = {
+    "log_likelihood_gain": None,
+    "holdout_error_before": None,
+    "holdout_error_after": None,
+}
+
+
+def with_mended(mismatch: Mismatch, found: Sequence[Finding], so: str) -> Mismatch:
+    """The mismatch with what was ``found`` in readings and mended before anything was fitted.
+
+    so: how it was mended, as in "with ... every residual is noise".
+    """
+    if not found:
+        return mismatch
+    verdict, text = mismatch.verdict, mismatch.explanation
+    if verdict == "none":
+        verdict, text = "explained", f"With {so}, {text[:1].lower()}{text[1:]}"
+    return replace(mismatch, verdict=verdict, explanation=text, findings=(*mismatch.findings, *found))
 
 
 def rival(trial: Trial, gap: float) -> dict[str, object]:

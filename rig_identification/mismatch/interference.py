@@ -19,7 +19,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import periodogram
 
 from rig_identification.estimate.parameters import AXES
-from rig_identification.mismatch.findings import written
+from rig_identification.mismatch.findings import NO_EVIDENCE, with_mended, written
 from rig_identification.recording import Recording, Series, Session
 from rig_identification.result import Finding, Mismatch
 
@@ -95,15 +95,10 @@ def without_lines(session: Session, lines: list[Line]) -> Session:
 
 def with_lines(mismatch: Mismatch, lines: list[Line]) -> Mismatch:
     """The mismatch with what is to be said of the lines that were taken out."""
-    if not lines:
-        return mismatch
-    verdict, text = mismatch.verdict, mismatch.explanation
-    if verdict == "none":
-        verdict = "explained"
-        tones = ", ".join(f"{line.frequency:.4g} Hz" for line in lines)
-        text = f"With {tones} taken out of what devices read, {text[:1].lower()}{text[1:]}"
-    found = tuple(_finding(line) for line in lines)
-    return replace(mismatch, verdict=verdict, explanation=text, findings=(*mismatch.findings, *found))
+    tones = ", ".join(f"{line.frequency:.4g} Hz" for line in lines)
+    return with_mended(
+        mismatch, [_finding(line) for line in lines], f"{tones} taken out of what devices read"
+    )
 
 
 def _columns(recording: Recording) -> Iterator[_Column]:
@@ -147,11 +142,11 @@ def _steady(column: _Column, frequency: float) -> bool:
     """Whether both halves of a column hold the line alike: what rings dies away."""
     half = column.values.size // 2
     parts = [(column.time[part], column.values[part]) for part in (slice(half), slice(half, None))]
-    (first, its), (second, other) = (
+    (first, spread), (second, other) = (
         _tone(t, v, _refined([(t, v)], frequency, _resolution(column))) for t, v in parts
     )
-    sizes, noise = np.hypot(*first), np.hypot(*second)
-    return bool(abs(sizes - noise) < STEADY * max(sizes, noise) + 3.0 * np.hypot(its, other))
+    before, after = np.hypot(*first), np.hypot(*second)
+    return bool(abs(before - after) < STEADY * max(before, after) + 3.0 * np.hypot(spread, other))
 
 
 def _tone(time: Array, values: Array, frequency: float) -> tuple[Array, float]:
@@ -257,9 +252,4 @@ def _finding(line: Line) -> Finding:
         "amplitude": (amplitude, line.std, line.unit),
         "frequency": (line.frequency, 0.0, "Hz"),
     }
-    nothing: dict[str, float | None] = {
-        "log_likelihood_gain": None,
-        "holdout_error_before": None,
-        "holdout_error_after": None,
-    }
-    return Finding("unknown", where, written(told), nothing, text)
+    return Finding("unknown", where, written(told), NO_EVIDENCE, text)

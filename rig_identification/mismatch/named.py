@@ -63,7 +63,7 @@ def named(
             law=None if step else law,
             guess=None if step or ideal.fitted.guess is None else ideal.fitted.guess.theta,
         )
-        next_one = Trials(list(tried.beside)) if tried.beside else None
+        next_one = None if tried.beside is None else Trials([tried.beside])
         if tried.lawful is not None:
             return tried.lawful
         search.screened = None

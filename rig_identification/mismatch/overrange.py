@@ -7,17 +7,9 @@ with its device, quantity, axis, times and limit.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from rig_identification.mismatch.findings import written
+from rig_identification.mismatch.findings import NO_EVIDENCE, with_mended, written
 from rig_identification.recording import Overrange, Recording, Session
 from rig_identification.result import Finding, Mismatch
-
-_NOTHING: dict[str, float | None] = {
-    "log_likelihood_gain": None,
-    "holdout_error_before": None,
-    "holdout_error_after": None,
-}
 
 
 def overrange_findings(session: Session) -> tuple[Finding, ...]:
@@ -58,16 +50,10 @@ def _finding(ends: list[tuple[Recording, Overrange]]) -> Finding:
         "shake more gently."
     )
     told = {"limit": (abs(limit) if both else limit, 0.0, first.unit)}
-    return Finding("unknown", where, written(told), _NOTHING, text)
+    return Finding("unknown", where, written(told), NO_EVIDENCE, text)
 
 
 def with_overranges(mismatch: Mismatch, session: Session) -> Mismatch:
     """The mismatch with what is to be said of sensors at the end of their range."""
-    found = overrange_findings(session)
-    if not found:
-        return mismatch
-    verdict, text = mismatch.verdict, mismatch.explanation
-    if verdict == "none":
-        verdict = "explained"
-        text = f"With what sensors read at the end of their range left out, {text[:1].lower()}{text[1:]}"
-    return replace(mismatch, verdict=verdict, explanation=text, findings=(*mismatch.findings, *found))
+    so = "what sensors read at the end of their range left out"
+    return with_mended(mismatch, overrange_findings(session), so)

@@ -100,7 +100,7 @@ class Trials:
     lawful: Explained | None = None  # what explains the session instead
     led: bool = False  # the first leads to another one, with which nothing is left
     chief: bool = True  # whether the first takes the larger part of what was left away
-    beside: tuple[Trial, ...] = ()  # what it leads to, where that is fitted already
+    beside: Trial | None = None  # what it leads to, where that is fitted already
 
 
 def trials(
@@ -146,7 +146,7 @@ def trials(
             look.at_rest()
             if more and look.certain:
                 told = look.told(look.certain)
-                return Trials(told, led=True, beside=look.beside.get(told[0].candidate.label, ()))
+                return Trials(told, led=True, beside=look.beside.get(told[0].candidate.label))
         if not look.enough:
             look.from_nothing_bent(guess)
     lead = look.leading() if more else None
@@ -192,7 +192,7 @@ class _Look:
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
     certain: list[Trial] = field(default_factory=list)  # what rest asks for, beside something that moves
-    beside: dict[str, tuple[Trial, ...]] = field(default_factory=dict)  # that something else, by label
+    beside: dict[str, Trial] = field(default_factory=dict)  # that something else, by label
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
@@ -270,8 +270,9 @@ class _Look:
         """
         self.notify("what rest asks for")
         asked = at_rest(self.here, self.seen, self.candidates, self.budget, self.promises)[:MOST]
+        most = max((a.promise.gain for a in asked), default=0.0)
         for found in asked:
-            behind = max(a.promise.gain for a in asked) - found.promise.gain
+            behind = most - found.promise.gain
             if self.budget.spent() or (self.at_noise and behind > BEATEN):
                 break
             start = from_rest(self.here, self.seen, found)
@@ -320,7 +321,7 @@ class _Look:
             second = attempt(trial.problem, trial.evaluation, promises[0], self.budget)
             if second is not None and at_noise(second):
                 out.append(replace(trial, evidence=second.evidence))
-                self.beside[trial.candidate.label] = (second,)
+                self.beside[trial.candidate.label] = second
         return out
 
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:

@@ -42,16 +42,17 @@ def _mixed(pure: Reading, shares: Array) -> Reading:
     """
     nodes, width = pure.values.shape
     felt = shares.reshape(width, width) * (1.0 - np.eye(width))
-    in_shares = np.zeros((nodes, width, width, width))
-    for i in range(width):
-        for j in range(width):
-            if i != j:
-                in_shares[:, i, i, j] = pure.values[:, j]
     own = pure
     if np.any(felt):
         mix = np.eye(width) + felt
         own = Reading(pure.values @ mix.T, mix @ pure.in_raw, mix @ pure.in_device)
-    in_device = np.concatenate([own.in_device, in_shares.reshape(nodes, width, width**2)], axis=2)
+    numbers = own.in_device.shape[2]
+    in_device = np.zeros((nodes, width, numbers + width**2))
+    in_device[:, :, :numbers] = own.in_device
+    for i in range(width):
+        first = numbers + width * i
+        in_device[:, i, first : first + width] = pure.values
+        in_device[:, i, first + i] = 0.0
     return Reading(own.values, own.in_raw, in_device)
 
 
