@@ -10,7 +10,7 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, still_promised
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, still_promised
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.first_fits import leading
 from rig_identification.mismatch.hypotheses import catalogue
@@ -79,7 +79,8 @@ def test_the_effect_that_leaves_the_other_one_plain_leads(two_at_once: tuple[Pro
         return trial
 
     right, wrong = tried("hinge_friction"), tried("hinge_damping")
-    found = leading([wrong, right], evaluation, candidates, mass, lambda stage: None, Budget(), finished)
+    left = excess(evaluation)
+    found = leading([wrong, right], left, candidates, mass, lambda stage: None, Budget(), finished)
     assert found is not None
-    assert found.candidate.label == "hinge_friction"
-    assert leading([wrong], evaluation, candidates, mass, lambda stage: None, Budget(), finished) is None
+    assert [t.candidate.effect for t in found] == ["hinge_friction", "cable_length"]
+    assert leading([wrong], left, candidates, mass, lambda stage: None, Budget(), finished) is None

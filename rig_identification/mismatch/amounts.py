@@ -241,7 +241,8 @@ def far_promises(
     if springs is not None:
         frequency = next(p.nominal for p in springs.candidate.parameters if p.name == "sprung_mass.frequency")
         axis = AXES.index(str(springs.candidate.where["axis"]))
-        out.append(ringing_ceiling(problem, frequency, axis, mass, springs.gain))
+        ringing = ringing_ceiling(problem, frequency, axis, mass, springs.gain)
+        out.append(replace(ringing, share=springs.share))
     if riders and riders[0].candidate.effect == "sprung_mass":
         # What swings along one axis may swing to all sides
         first = riders[0]

@@ -21,22 +21,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import count_of, needed_gain
-from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.hypotheses import compatible, count_of, needed_gain
+from rig_identification.mismatch.screen import Promise, carried, extended, promises_of
 from rig_identification.mismatch.trial import log_evidence
 from rig_identification.mismatch.unbent import as_described, at_first
 
 #: Where fits start, in std of a number's prior.
 ASIDE = (0.3, -0.3)
+#: Nats that are none at all: what only motion shows.
+NONE = 1e-9
 #: Steps of a fit.
 STEPS = 10
 #: Nats within which rest tells next to nothing between two.
 CLOSE = 5.0
 #: Hypotheses of one effect that are told: its other places are its rivals anyway.
 ALIKE = 2
+#: Hypotheses that one of a pair is looked for among, others fitted beside each, and pairs that are told.
+FIRSTS, SECONDS, PAIRS = 4, 12, 3
 
 
 @dataclass(frozen=True)
@@ -62,16 +66,11 @@ def at_rest(
     promises: of the motion. Of what rest tells next to nothing about, which of three neighbours a load cell
     feels for one, those come first that the motion promises more of.
     """
-    if not problem.rests:
-        return []
-    still = replace(problem, runs=())
-    theta = as_described(problem, evaluation.point.theta)
-    without = _fitted(still, Point(theta, (), evaluation.point.rest_guesses))
+    still, without = _still(problem, evaluation)
     if without is None or _quiet(still, without):
         return []
-    asked = [c for c in candidates if c.build is None and not c.slow]
     out = []
-    for candidate in asked:
+    for candidate in _shown_at_rest(still, without, candidates):
         if budget.spent():
             break
         best = _with(candidate, still, without.point)
@@ -102,11 +101,97 @@ def at_rest(
     return few
 
 
+@dataclass(frozen=True)
+class BothAtRest:
+    """Two hypotheses with which the static recordings are explained, to the noise."""
+
+    first: Candidate  # of which rest asks more
+    second: Candidate
+    evidence: float  # log evidence at rest, each as one place of many
+    problem: Problem  # with both in
+    start: Evaluation  # of the motion: the rig as it hangs with both, and the likelier body
+
+
+def both_at_rest(
+    problem: Problem,
+    evaluation: Evaluation,
+    asked: Sequence[AtRest],
+    candidates: list[Candidate],
+    budget: Budget = UNLIMITED,
+) -> list[BothAtRest]:
+    """Pairs that explain the static recordings where no single hypothesis does, likeliest first.
+
+    asked: what rest asks for, likeliest first; one of a pair is among the first of them. The other one is
+    fitted, from either side again, where first order promises most beside it.
+    """
+    still, without = _still(problem, evaluation)
+    if without is None or any(a.settles for a in asked):
+        return []
+    settled: dict[frozenset[str], tuple[float, Candidate, Candidate, Problem, Evaluation]] = {}
+    for found in asked[:FIRSTS]:
+        first = found.promise.candidate
+        alone = None if budget.spent() else _with(first, still, without.point)
+        if alone is None:
+            continue
+        for second in _shown_at_rest(*alone, compatible(candidates, [first]))[:SECONDS]:
+            pair = frozenset((first.label, second.label))
+            both = None if pair in settled or budget.spent() else _with(second, alone[0], alone[1].point)
+            if both is None or not _quiet(*both):
+                continue
+            told = log_evidence(both[1]) - float(np.log(first.places) + np.log(second.places))
+            settled[pair] = told, first, second, *both
+    likely = sorted(settled.values(), key=lambda pair: -pair[0])[:PAIRS]
+    out = []
+    for told, first, second, wide, fitted in likely:
+        moving = extended(problem, (first, second))
+        begun = _begun(moving, evaluation, carried(moving, wide, fitted.point).theta)
+        if begun is not None:
+            out.append(BothAtRest(first, second, told, moving, begun))
+    return out
+
+
+def _shown_at_rest(still: Problem, without: Evaluation, candidates: list[Candidate]) -> list[Candidate]:
+    """Those of ``candidates`` that can show at rest, what first order promises most of first.
+
+    A reading follows its device's numbers in a straight line, and promises what it keeps; of the rig first
+    order only says whether a number matters at all.
+    """
+    # A mean holds no time: a drift is a zero to it, which is asked by itself
+    asked = [c for c in candidates if c.build is None and not c.slow and c.where.get("law") != "drift"]
+    # A wrong sign says nothing of the rig either
+    promises = promises_of(still, without, [replace(c, positive=0) for c in asked])
+    shown = [
+        (c, p.gain)
+        for c, p in zip(asked, promises, strict=False)
+        if p.gain > (needed_gain(c, count_of(candidates)) if _reads(c) else NONE)
+    ]
+    return [c for c, _ in sorted(shown, key=lambda s: -s[1])]
+
+
+def _reads(candidate: Candidate) -> bool:
+    """Whether a candidate changes what a device reads, and nothing of what hangs there."""
+    return all(p.kind == "device" for p in candidate.parameters)
+
+
+def _still(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation | None]:
+    """The static recordings alone, and the rig as described fitted to them; None where there are none."""
+    still = replace(problem, runs=())
+    if not problem.rests:
+        return still, None
+    theta = as_described(problem, evaluation.point.theta)
+    return still, _fitted(still, Point(theta, (), evaluation.point.rest_guesses))
+
+
 def from_rest(problem: Problem, evaluation: Evaluation, found: AtRest) -> Evaluation | None:
     """Where a fit to the motion starts: the rig as it hangs with a hypothesis in, and the likelier body."""
-    fitted = found.theta.copy()
+    return _begun(problem, evaluation, found.theta)
+
+
+def _begun(problem: Problem, evaluation: Evaluation, theta: NDArray[np.float64]) -> Evaluation | None:
+    """About ``theta`` with its own body or that of ``evaluation``, whichever leaves less of the motion."""
+    fitted = theta.copy()
     fitted[:INERTIAL] = evaluation.point.theta[:INERTIAL]
-    starts = (at_first(problem, evaluation, theta) for theta in (found.theta, fitted))
+    starts = (at_first(problem, evaluation, t) for t in (theta, fitted))
     return min((s for s in starts if s is not None), key=lambda s: s.cost, default=None)
 
 
@@ -124,7 +209,8 @@ def _with(candidate: Candidate, still: Problem, point: Point) -> tuple[Problem, 
     begun = carried(wide, still, point)
     first = wide.bench.parameters.index_of(candidate.parameters[0].name)
     fits = []
-    for aside in ASIDE if candidate.positive == 0 else ASIDE[:1]:
+    sides = (0.0,) if _reads(candidate) else (ASIDE if candidate.positive == 0 else ASIDE[:1])
+    for aside in sides:
         theta = begun.theta.copy()
         theta[first] = aside
         fits.append(_fitted(wide, replace(begun, theta=theta)))
@@ -134,6 +220,6 @@ def _with(candidate: Candidate, still: Problem, point: Point) -> tuple[Problem, 
 
 def _fitted(problem: Problem, point: Point) -> Evaluation | None:
     try:
-        return solve(problem, point, iterations=STEPS, tolerance=0.05)[0]
+        return solve(problem, point, iterations=STEPS, tolerance=0.05, polish=POLISH)[0]
     except FloatingPointError:
         return None

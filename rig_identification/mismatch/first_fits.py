@@ -160,27 +160,27 @@ def begun(
 
 def leading(
     tried: list[Trial],
-    before: Evaluation,
+    left: float,
     candidates: list[Candidate],
     mass: float,
     notify: Notify,
     budget: Budget,
     finish: Callable[[Trial], Trial | None],
     refused: int = 0,
-) -> Trial | None:
-    """The hypothesis with which, and with one more, nothing is left; None where there is none.
+) -> tuple[Trial, Trial] | None:
+    """The hypothesis with which, and with one more, nothing is left, and that one; None where there is none.
 
-    finish: fits a trial to its end; None where its sign makes no sense. refused: so many of the first that
-    were tried were asked before, and are not.
+    left: without any of them, nats. finish: fits a trial to its end; None where its sign makes no sense.
+    refused: so many of the first that were tried were asked before, and are not.
 
     Of two effects at once the one that takes most away alone may be neither: what bends to both does. What
     is left with either of the two shows the other one plainly.
     """
-    best: tuple[float, Trial] | None = None
+    best: tuple[Trial, Trial] | None = None
     least = min((excess(t.evaluation) for t in tried), default=0.0)
     ended: dict[str, float] = {}  # what is left of what was fitted to its end
     for trial in sorted(tried[refused:], key=lambda t: (t.candidate.build is not None, excess(t.evaluation))):
-        if excess(trial.evaluation) > min(CHIEF * excess(before), RIVAL * least):
+        if excess(trial.evaluation) > min(CHIEF * left, RIVAL * least):
             continue
         if best is not None and trial.candidate.build is not None:
             # What changes the model and is fitted slowly may bend to anything
@@ -199,9 +199,11 @@ def leading(
             if promise.share < DIRECT or promise.candidate.build is not None:
                 continue
             second = attempt(first.problem, first.evaluation, promise, budget)
+            if second is not None and almost(second, first.evaluation):
+                second = finished(second, budget)
             if second is None or not at_noise(second):
                 continue
-            if best is None or second.evidence > best[0]:
-                best = second.evidence, first
+            if best is None or second.evidence > best[1].evidence:
+                best = first, second
             break
-    return None if best is None else best[1]
+    return best

@@ -13,14 +13,14 @@ from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
-from rig_identification.mismatch.first_fits import AT_NOISE
+from rig_identification.mismatch.first_fits import AT_NOISE, at_noise
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain, worth_a_fit
 from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.push import push_too
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import MOST_EFFECTS, Law, Trials, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.trial import log_evidence, mass_of
 from rig_identification.mismatch.undecided import undecided_beside
 from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
 from rig_identification.mismatch.whole_runs import pruned, whole_runs
@@ -43,27 +43,32 @@ def named(
     fallback: Explained | None = None
     uneven: tuple[Problem, Evaluation] | None = None  # pieces with an effect in that lack more
     led = False  # what is in the model waits for another one
-    next_one: Trials | None = None  # ... which is fitted already
+    known: Trials | None = None  # ... which is fitted already, and whether its rivals were asked
     origin = search.forked()
     lawful: Callable[[], Explained | None] | None = None  # what tells whether a law explains it all instead
     for step in range(MOST_EFFECTS):
-        if step and search.budget.spent():
+        if step and search.budget.spent() and known is None:
             break
         left = compatible(candidates, [t.candidate for t in search.found])
         at = (step + 0.5) / (MOST_EFFECTS + 1)
-        tried = next_one or trials(
-            search.here,
-            search.evaluation,
-            left,
-            ORDINARY,
-            lambda label, at=at: notify(f"search: {label}", at),  # type: ignore[misc]
-            search.screened,
-            search.budget,
-            more=step + 1 < MOST_EFFECTS,
-            law=None if step else law,
-            guess=None if step or ideal.fitted.guess is None else ideal.fitted.guess.theta,
-        )
-        next_one = None if tried.beside is None else Trials([tried.beside])
+        tried = known if known is not None and (known.asked or search.budget.spent()) else None
+        if tried is None:
+            tried = trials(
+                search.here,
+                search.evaluation,
+                left,
+                ORDINARY,
+                lambda label, at=at: notify(f"search: {label}", at),  # type: ignore[misc]
+                search.screened,
+                search.budget,
+                more=step + 1 < MOST_EFFECTS,
+                law=None if step else law,
+                guess=None if step or ideal.fitted.guess is None else ideal.fitted.guess.theta,
+            )
+            if known is not None and not any(map(at_noise, tried.done)):
+                # Time ran out before it was come to again
+                tried = known
+        known = Trials(list(tried.beside), asked=tried.asked) if tried.beside else None
         if tried.lawful is not None:
             return tried.lawful
         search.screened = None
@@ -84,8 +89,10 @@ def named(
             break
         search.adopt(tried, first)
         if not search.whole:
+            search.start = max(search.start, tried.left)
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
-        led = tried.led and step + 1 < MOST_EFFECTS and not search.budget.spent()
+        more = known is not None or not search.budget.spent()
+        led = tried.led and step + 1 < MOST_EFFECTS and more
         if led:
             # With one more nothing is left: there is no use in whole runs without it
             continue
@@ -239,7 +246,7 @@ def _second_choices(
 def _most_promising(
     standing: list[tuple[Explained, Search]], candidates: list[Candidate]
 ) -> tuple[Explained, Search]:
-    """Of hypotheses of which none explains all, the one that would with one more, to first order.
+    """Of hypotheses of which none explains all, the likeliest with one more, to first order.
 
     Short pieces hardly tell a cable's length from its hinge; with what else is wrong in the model
     whole runs do.
@@ -251,9 +258,9 @@ def _most_promising(
         mass = mass_of(search.here, search.evaluation)
         search.screened = screen(search.here, search.evaluation, others, mass)
         gains = [p.gain - needed_gain(p.candidate, count) for p in search.screened]
-        after = search.evaluation.cost - max(0.0, *gains)
-        if best is None or after < best[0]:
-            best = after, found, search
+        likely = log_evidence(search.evaluation) + max(0.0, *gains)
+        if best is None or likely > best[0]:
+            best = likely, found, search
     if best is None:
         raise ValueError("nothing to choose from")
     return best[1:]

@@ -10,14 +10,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, solve, still_promised
+from rig_identification.estimate.solve import (
+    POLISH,
+    Evaluation,
+    Problem,
+    evaluate,
+    excess,
+    solve,
+    still_promised,
+)
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
-from rig_identification.mismatch.at_rest import AtRest, at_rest, from_rest
+from rig_identification.mismatch.at_rest import AtRest, at_rest, both_at_rest, from_rest
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
@@ -27,6 +36,7 @@ from rig_identification.mismatch.first_fits import (
     DIRECT,
     RIVAL,
     Notify,
+    almost,
     at_noise,
     begun,
     leading,
@@ -37,7 +47,8 @@ from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
 from rig_identification.mismatch.pairs import first_of_two
 from rig_identification.mismatch.same_clock import contradicted
-from rig_identification.mismatch.screen import Promise, carried, screen
+from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.simpler import fitted_simpler
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
     FIRST_STEPS,
@@ -50,6 +61,7 @@ from rig_identification.mismatch.trial import (
     beyond_doubt,
     earned_evidence,
     finished,
+    fitted_from,
     log_evidence,
     mass_of,
     ordinary_errors,
@@ -69,6 +81,8 @@ TRIED, TRIED_FAR = 4, 2
 #: Share of what was left that no stand-in comes down to: one bends to most of what it stands in for, and
 #: leaves a part in ten or in a hundred of it.
 NEXT_TO_NONE = 1e-3
+#: What gives way or swings that is tried before changes of numbers which promise less.
+AT_ONCE = 3
 #: Log evidence that an effect has to gain.
 MEANT = 3.0
 
@@ -100,7 +114,9 @@ class Trials:
     lawful: Explained | None = None  # what explains the session instead
     led: bool = False  # the first leads to another one, with which nothing is left
     chief: bool = True  # whether the first takes the larger part of what was left away
-    beside: Trial | None = None  # what it leads to, where that is fitted already
+    beside: tuple[Trial, ...] = ()  # what it leads to, likeliest first, where that is fitted already
+    asked: bool = False  # whether rivals of that were asked as well
+    left: float = 0.0  # nats, without any of them
 
 
 def trials(
@@ -140,21 +156,29 @@ def trials(
         return Trials(look.told([led.first]))
     if led is not None and here is problem:
         look.fitted = led.first
+    lead = None
     if misfit(seen) > VERY_FAR:
         look.outright()
-        if not look.enough:
+        # What takes nearly all away is asked at once whether with one more it leaves nothing
+        lead = look.leading() if more and look.almost else None
+        if lead is None and not look.enough:
             look.at_rest()
             if more and look.certain:
-                told = look.told(look.certain)
-                return Trials(told, led=True, beside=look.beside.get(told[0].candidate.label))
-        if not look.enough:
+                return look.leads(look.certain, asked=True)
+            if look.moving:
+                look.giving_way_at_once()
+                lead = look.leading() if more and look.almost else None
+        if lead is None and not look.enough:
             look.from_nothing_bent(guess)
-    lead = look.leading() if more else None
+    if lead is None and more:
+        lead = look.leading()
     if lead is None and not look.enough and (not far or (promises and promises[0].share > DIRECT)):
         look.directly()
         lead = look.leading() if more else None
+    if lead is None and more and far and not look.enough:
+        lead = look.giving_way_beside()
     if lead is not None:
-        return Trials(look.told([lead]), led=True)
+        return look.leads([lead])
     if far and not look.enough:
         look.without_devices()
     if far and not look.enough:
@@ -164,8 +188,7 @@ def trials(
     if not far and not _without_support(look.tried, seen):
         look.yielding_a_little()
     elif not gives_way(problem.bench.parameters.model):
-        # A part on springs that leaves only noise in short pieces may be a ceiling that rings with the body
-        look.begin(ringing_like(here, look.tried, seen, mass))
+        look.ringing()
     found = look.ended(limit)
     if found.done or far or not more or not look.passed_over():
         return found
@@ -192,8 +215,10 @@ class _Look:
     device: str | None = None  # that contradicts all others
     lawful: Explained | None = None
     certain: list[Trial] = field(default_factory=list)  # what rest asks for, beside something that moves
-    beside: dict[str, Trial] = field(default_factory=dict)  # that something else, by label
+    beside: dict[str, list[Trial]] = field(default_factory=dict)  # that something else, by label
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
+    moving: bool = False  # whether rest says next to nothing of what is left, and no number promises much
+    rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
     @property
@@ -215,6 +240,29 @@ class _Look:
     def enough(self) -> bool:
         """Whether anything that was tried leaves only noise, or next to nothing of what was left."""
         return any(self._enough(t) for t in self.tried)
+
+    @property
+    def almost(self) -> bool:
+        """Whether anything that was tried leaves little of what was left, and yet more than noise."""
+        return any(almost(t, self.seen) for t in self.tried)
+
+    @cached_property
+    def left(self) -> float:
+        """What is left without any of them (nats), with the recordings weighed as they are here.
+
+        Where the search begins channels were weighed by their residuals (cautious.py): rest may be far off
+        there, and the runs less than any fit that heeds rest leaves of them.
+        """
+        there = excess(self.seen)
+        if not self.far:
+            return there
+        try:
+            fitted, _ = solve(
+                self.here, self.seen.point, iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH
+            )
+        except FloatingPointError:
+            return there
+        return max(there, excess(fitted)) if fitted.cost < self.seen.cost else there
 
     def _enough(self, trial: Trial) -> bool:
         return at_noise(trial) or excess(trial.evaluation) < NEXT_TO_NONE * excess(self.seen)
@@ -260,7 +308,15 @@ class _Look:
         stretched = stretching(self.here, self.seen, self.mass)
         promised += [] if stretched is None or stretched.share < DIRECT else [stretched]
         self.begin(promised)
+        self.ringing()
         self.hopeless = {p.candidate.label for p in self.untried(promised)} if not self.at_noise else set()
+
+    def ringing(self) -> None:
+        """Ceilings that ring as a part on springs does that was fitted: a ceiling rings with the body."""
+        like = ringing_like(self.here, self.tried, self.seen, self.mass)
+        new = [p for p in like if p.candidate.label not in self.rung]
+        self.rung |= {p.candidate.label for p in new}
+        self.begin(new)
 
     def at_rest(self) -> None:
         """What the static recordings ask for by themselves, started where they have it.
@@ -285,7 +341,9 @@ class _Look:
             if trial is not None:
                 self.tried.append(trial)
         if not self.enough:
-            self.certain = self._certain(asked)
+            self.certain = self._certain(asked) or self._two_at_rest(asked)
+        soon = max((p.share for p in self.promises if not p.candidate.slow), default=0.0)
+        self.moving = most < WORTH * excess(self.seen) and soon < CHIEF
 
     def _certain(self, asked: list[AtRest]) -> list[Trial]:
         """What rest asks for beyond doubt beside another effect of the motion, likeliest first.
@@ -321,8 +379,34 @@ class _Look:
             second = attempt(trial.problem, trial.evaluation, promises[0], self.budget)
             if second is not None and at_noise(second):
                 out.append(replace(trial, evidence=second.evidence))
-                self.beside[trial.candidate.label] = second
+                self.beside[trial.candidate.label] = [second]
         return out
+
+    def _two_at_rest(self, asked: list[AtRest]) -> list[Trial]:
+        """Of two errors that both show at rest: the one that rest asks more of; the motion decides.
+
+        Equilibrium with both is explained where with either it is not, and a fit to it takes a few hundredths
+        of a second. Where the motion leaves only noise with both, the other one is known as well.
+        """
+        if not asked:
+            return []
+        self.notify("what rest asks for, two at once")
+        out: dict[str, Trial] = {}
+        for pair in both_at_rest(self.here, self.seen, asked, self.candidates, self.budget):
+            self.notify(f"{pair.first.label}, and {pair.second.label}")
+            second = fitted_from(pair.second, pair.problem, pair.start, self.budget)
+            if second is None or not at_noise(second):
+                continue
+            problem = extended(self.here, (pair.first,))
+            alone = evaluate(problem, carried(problem, pair.problem, second.evaluation.point))
+            if alone is None:
+                continue
+            label = pair.first.label
+            if label not in out or second.evidence > out[label].evidence:
+                out[label] = Trial(pair.first, problem, alone, second.evidence)
+            self.beside.setdefault(label, []).append(second)
+            self.beside[label].sort(key=lambda t: -t.evidence)
+        return sorted(out.values(), key=lambda t: -t.evidence)
 
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
@@ -355,7 +439,7 @@ class _Look:
             return None
         found = leading(
             list(self.tried),
-            self.seen,
+            self.left,
             self.candidates,
             self.mass,
             self.notify,
@@ -364,7 +448,13 @@ class _Look:
             self.refused,
         )
         self.refused = len(self.tried)
-        return found
+        if found is None:
+            return None
+        first, second = found
+        others = compatible(self.candidates, [first.candidate])
+        seconds = [second, *fitted_simpler(first.problem, second, others)]
+        self.beside[first.candidate.label] = sorted(seconds, key=lambda t: -t.evidence)
+        return first
 
     def finished(self, trial: Trial) -> Trial | None:
         """A trial fitted to its end, which takes its place among what was tried."""
@@ -374,7 +464,7 @@ class _Look:
         return ended
 
     def told(self, done: list[Trial]) -> list[Trial]:
-        """Trials, likeliest first, with the lag beside every late clock: to first order they are alike.
+        """Trials, likeliest first, with special cases of each, and the lag beside every late clock.
 
         A clock that leaves only noise keeps its lag from being tried, and with one more effect it may leave
         as little as the lag by itself. A clock that its stamps contradict is told only where nothing else
@@ -390,6 +480,11 @@ class _Look:
             twin = None if begun is None else finished(begun, self.budget)
             if twin is not None and twin.evidence > self.needed:
                 out.append(twin)
+        for trial in done if self.far else ():  # near the noise all were asked
+            known = {t.candidate.label for t in out}
+            for simple in fitted_simpler(self.here, trial, self.candidates):
+                if simple.candidate.label not in known and simple.evidence > self.needed:
+                    out.append(simple)
         heard = [(t, contradicted(t)) for t in out]
         likely = max((t.evidence for t, impossible in heard if not impossible), default=-np.inf)
         out = [t for t, impossible in heard if not impossible or t.evidence - likely > BEATEN]
@@ -410,10 +505,27 @@ class _Look:
         promises = screen(self.problem, about, self.candidates, self.mass)
         self.begin(worth_a_fit(promises, self.count, self.device), about)
 
+    @cached_property
+    def scanned(self) -> list[Promise]:
+        """What gives way and what swings, by its best amount."""
+        self.notify("what gives way")
+        return far_promises(self.here, self.seen, self.promises, self.mass, self.budget)
+
+    def giving_way_at_once(self) -> None:
+        """What gives way or swings and promises more than any change of numbers, before these.
+
+        Rest that is quiet has no error of geometry, cells or level in it that would explain so much motion.
+        """
+        soon = max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
+        worthy = sorted((p for p in self.scanned if p.gain > soon), key=lambda p: -p.gain)[:AT_ONCE]
+        worthy = self.untried(worthy)
+        self.begin(worthy)
+        if not self.at_noise:
+            self.hopeless |= {p.candidate.label for p in self.untried(worthy)}
+
     def giving_way(self) -> None:
         """What gives way, whatever screening says of it, and all else; the law where that explains it."""
-        self.notify("what gives way")
-        worthy = self.untried(far_promises(self.here, self.seen, self.promises, self.mass, self.budget))
+        worthy = self.untried(self.scanned)
         known = {p.candidate.label for p in worthy}
         others = self.untried(worth_a_fit(self.promises, self.count))
         worthy += [p for p in others if p.candidate.label not in known]
@@ -436,6 +548,41 @@ class _Look:
         self.tried = []
         self.begin(worth_a_fit(rest, self.count))
         return bool(self.tried)
+
+    def giving_way_beside(self) -> Trial | None:
+        """What takes the larger part away and leaves nothing beside something that gives way; None: nothing.
+
+        A clock that is off and a ceiling that yields: without the clock nothing that the ceiling promises
+        is to be seen.
+        """
+        plain = [
+            t for t in self.tried if t.candidate.build is None and excess(t.evaluation) < CHIEF * self.left
+        ]
+        first = min(plain, key=lambda t: excess(t.evaluation), default=None)
+        if first is None or gives_way(first.problem.bench.parameters.model):
+            return None
+        self.notify(f"{first.candidate.label}, and what gives way")
+        promises = supports(first.problem, first.evaluation, self.mass, self.budget)
+        best = max(promises, key=lambda p: p.gain, default=None)
+        if best is None or best.share < CHIEF or self.budget.spent():
+            return None
+        self.notify(f"{first.candidate.label}, and {best.candidate.label}")
+        second = attempt(first.problem, first.evaluation, best, self.budget)
+        if second is not None and almost(second, first.evaluation):
+            second = finished(second, self.budget)
+        if second is None or not at_noise(second):
+            return None
+        self.beside[first.candidate.label] = [second]
+        return replace(first, evidence=second.evidence)
+
+    def leads(self, done: list[Trial], *, asked: bool = False) -> Trials:
+        """Trials of which the first leads to another one, with which nothing is left.
+
+        asked: whether rivals of that other one were asked as well.
+        """
+        told = self.told(done)
+        beside = self.beside.get(told[0].candidate.label, ())
+        return Trials(told, led=True, beside=tuple(beside), asked=asked, left=self.left)
 
     def _lawfully(self) -> bool:
         """Whether a law explains it all."""
@@ -496,8 +643,8 @@ class _Look:
             if ended.evidence > self.needed:
                 _place(ended, beaten if last else done)
         told = self.told(done)
-        chief = bool(told) and excess(told[0].evaluation) < CHIEF * excess(self.seen)
-        return Trials(told, self.device, tuple(map(among_places, beaten)), chief=chief)
+        chief = bool(told) and excess(told[0].evaluation) < CHIEF * self.left
+        return Trials(told, self.device, tuple(map(among_places, beaten)), chief=chief, left=self.left)
 
 
 def _place(trial: Trial, among: list[Trial]) -> None:

@@ -160,6 +160,17 @@ def attempt(
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
 
 
+def fitted_from(
+    candidate: Candidate, problem: Problem, start: Evaluation, budget: Budget = UNLIMITED
+) -> Trial | None:
+    """A trial of a hypothesis that the problem has in it, fitted from ``start``; None where none starts."""
+    try:
+        fitted, settled = _first_steps(problem, start.point, LAST_STEPS, budget.spent)
+    except FloatingPointError:
+        return None
+    return Trial(candidate, problem, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+
+
 def _placed(begun: Point, promised: Point, problem: Problem, candidate: Candidate) -> Point:
     """Where a fit stands, with what has no amount yet at its promised place: there it tells its amount."""
     theta = begun.theta.copy()
