@@ -175,10 +175,12 @@ def trials(
     if lead is None and not look.enough and (not far or (promises and promises[0].share > DIRECT)):
         look.directly()
         lead = look.leading() if more else None
-    if lead is None and more and far and not look.enough:
-        lead = look.giving_way_beside()
     if lead is not None:
         return look.leads([lead])
+    if more and far and not look.enough:
+        ahead = look.giving_way_beside()
+        if ahead:
+            return look.leads(ahead, asked=True)
     if far and not look.enough:
         look.without_devices()
     if far and not look.enough:
@@ -549,31 +551,36 @@ class _Look:
         self.begin(worth_a_fit(rest, self.count))
         return bool(self.tried)
 
-    def giving_way_beside(self) -> Trial | None:
-        """What takes the larger part away and leaves nothing beside something that gives way; None: nothing.
+    def giving_way_beside(self) -> list[Trial]:
+        """What takes the larger part away and leaves nothing beside what gives way, likeliest first.
 
         A clock that is off and a ceiling that yields: without the clock nothing that the ceiling promises
-        is to be seen.
+        is to be seen. What is alike to the clock, a lag, is asked beside the same ceiling.
         """
-        plain = [
-            t for t in self.tried if t.candidate.build is None and excess(t.evaluation) < CHIEF * self.left
-        ]
-        first = min(plain, key=lambda t: excess(t.evaluation), default=None)
-        if first is None or gives_way(first.problem.bench.parameters.model):
-            return None
-        self.notify(f"{first.candidate.label}, and what gives way")
-        promises = supports(first.problem, first.evaluation, self.mass, self.budget)
+        chief = CHIEF * self.left
+        plain = [t for t in self.tried if t.candidate.build is None and excess(t.evaluation) < chief]
+        plain.sort(key=lambda t: excess(t.evaluation))
+        if not plain or gives_way(plain[0].problem.bench.parameters.model):
+            return []
+        self.notify(f"{plain[0].candidate.label}, and what gives way")
+        promises = supports(plain[0].problem, plain[0].evaluation, self.mass, self.budget)
         best = max(promises, key=lambda p: p.gain, default=None)
-        if best is None or best.share < CHIEF or self.budget.spent():
-            return None
-        self.notify(f"{first.candidate.label}, and {best.candidate.label}")
-        second = attempt(first.problem, first.evaluation, best, self.budget)
-        if second is not None and almost(second, first.evaluation):
-            second = finished(second, self.budget)
-        if second is None or not at_noise(second):
-            return None
-        self.beside[first.candidate.label] = [second]
-        return replace(first, evidence=second.evidence)
+        if best is None or best.share < CHIEF:
+            return []
+        out: dict[str, Trial] = {}
+        for first in plain[:FINISHED]:
+            label = first.candidate.label
+            alike = excess(first.evaluation) < 2.0 * excess(plain[0].evaluation)
+            if self.budget.spent() or label in out or not alike:
+                continue
+            self.notify(f"{label}, and {best.candidate.label}")
+            second = attempt(first.problem, first.evaluation, best, self.budget)
+            if second is not None and almost(second, first.evaluation):
+                second = finished(second, self.budget)
+            if second is not None and at_noise(second):
+                out[label] = replace(first, evidence=second.evidence)
+                self.beside[label] = [second]
+        return sorted(out.values(), key=lambda t: -t.evidence)
 
     def leads(self, done: list[Trial], *, asked: bool = False) -> Trials:
         """Trials of which the first leads to another one, with which nothing is left.
