@@ -12,7 +12,7 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import ORDINARY, fit_session
 from rig_identification.estimate.solve import Evaluation, Problem
-from rig_identification.mismatch.at_rest import ALIKE, at_rest, from_rest
+from rig_identification.mismatch.at_rest import ALIKE, at_rest, both_at_rest, from_rest
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import with_reference
@@ -102,3 +102,43 @@ def test_what_rest_is_certain_of_leads_to_what_swings_beside_it() -> None:
     turn = found.done[0].problem.bench.parameters.named(found.done[0].evaluation.point.theta)
     assert abs(turn["imu.orientation.y"] - TURNED) < 0.2 * TURNED
     assert misfit(found.done[0].evaluation) > NEAR_SQUARE
+
+
+@pytest.fixture(scope="module")
+def longer_and_turned() -> tuple[Problem, Evaluation]:
+    """A cable too long beside a turned IMU: both show at rest, neither explains it."""
+    spec = replace(shaken(10, 6.0), effects={"cable_length": (0.0, 0.0, LONGER, 0.0)}, doubts=False)
+    made, _ = simulate_session(spec, np.random.default_rng(2))
+    fitted = fit_session(replace(made, recordings=tuple(_turned(r) for r in made.recordings)))
+    return with_reference(fitted.problem, fitted.rest), fitted.evaluation
+
+
+BOTH = {"cable_length cable_3", "imu_misalignment imu"}
+
+
+def test_two_errors_that_show_at_rest_are_found_there(longer_and_turned: tuple[Problem, Evaluation]) -> None:
+    problem, evaluation = longer_and_turned
+    candidates = catalogue(problem)
+    asked = at_rest(problem, evaluation, candidates)
+    assert not any(a.settles for a in asked)
+    pairs = both_at_rest(problem, evaluation, asked, candidates)
+    assert {pairs[0].first.label, pairs[0].second.label} == BOTH
+    assert pairs[0].start.cost < evaluation.cost
+    assert both_at_rest(problem, evaluation, asked, candidates, Budget(0.0)) == []
+
+
+def test_the_motion_confirms_what_rest_asks_two_of(longer_and_turned: tuple[Problem, Evaluation]) -> None:
+    problem, evaluation = longer_and_turned
+    found = trials(problem, evaluation, catalogue(problem), ORDINARY, lambda label: None, more=True)
+    assert found.led
+    second = found.beside[0]
+    assert {found.done[0].candidate.label, second.candidate.label} == BOTH
+    assert misfit(second.evaluation) < 1.05
+    values = second.problem.bench.parameters.named(second.evaluation.point.theta)
+    assert abs(values["imu.orientation.y"] - TURNED) < 0.1 * TURNED
+
+
+def test_one_error_at_rest_is_no_pair(longer: tuple[Problem, Evaluation]) -> None:
+    problem, evaluation = longer
+    candidates = catalogue(problem)
+    assert both_at_rest(problem, evaluation, at_rest(problem, evaluation, candidates), candidates) == []

@@ -23,6 +23,8 @@ from rig_identification.simulate import simulate_session
 STIFFNESS, HEAVY = 4e5, 80.0
 LOWER = 0.08
 TOO_MUCH = 6e-3
+#: The same of a ceiling that yields a little, and s by which the first cell is late.
+FIRM, HEAVIER, LATE = 3e6, 800.0, 0.0123
 
 
 def _drawn_lower(session: Session) -> Session:
@@ -41,6 +43,17 @@ def _biased(session: Session) -> Session:
         assert imu is not None
         values = imu.values + np.array([0.0, TOO_MUCH, 0.0, 0.0, 0.0, 0.0])
         return replace(recording, imu=replace(imu, values=values))
+
+    return replace(session, recordings=tuple(wrong(r) for r in session.recordings))
+
+
+def _late(session: Session) -> Session:
+    """The session with a load cell whose clock is off."""
+
+    def wrong(recording: Recording) -> Recording:
+        name, cell = next(iter(recording.tension.items()))
+        late = replace(cell, time=cell.time + LATE)
+        return replace(recording, tension={**recording.tension, name: late})
 
     return replace(session, recordings=tuple(wrong(r) for r in session.recordings))
 
@@ -74,3 +87,14 @@ def test_cables_that_stretch_lead_to_a_bias_at_once() -> None:
     assert found.led
     assert found.done[0].candidate.effect == "cable_elasticity"
     assert "what rest asks for" not in stages
+
+
+def test_what_gives_way_is_seen_once_a_clock_is_right() -> None:
+    effects = {"ceiling_compliance.stiffness": (0.0, 0.0, FIRM), "ceiling_compliance.mass": (HEAVIER,)}
+    stages: list[str] = []
+    found = _looked(effects, _late, stages)
+    assert found.led
+    assert found.beside
+    labels = {found.done[0].candidate.label, found.beside[0].candidate.label}
+    assert labels == {"clock_offset cable_1", "ceiling_compliance ceiling z"}
+    assert misfit(found.beside[0].evaluation) < 1.05

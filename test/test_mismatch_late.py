@@ -110,3 +110,14 @@ def _slow(recording: Recording, name: str) -> Recording:
     first = lfilter_zi(numerator[0], denominator) * tension.values[0, 0]
     slow, _ = lfilter(numerator[0], denominator, tension.values[:, 0], zi=first)
     return replace(recording, tension={**recording.tension, name: replace(tension, values=slow[:, None])})
+
+
+def test_what_a_piece_does_not_know_of_before_it_says_nothing() -> None:
+    time = np.arange(SAMPLES) * DURATION / SAMPLES
+    noise = np.random.default_rng(1).normal(size=SAMPLES)
+    # The clock leaves some of the motion; an open state at every start costs the lag more than that
+    clock = _trial("clock_offset", noise + 0.15 * np.sin(2 * np.pi * 1.0 * time), 0.0)
+    lag = _trial("sensor_lag", noise, -20.0)
+    first, second = told_apart([clock, lag], 3.0)  # type: ignore[list-item]
+    assert first.candidate.effect == "sensor_lag"
+    assert first.evidence - second.evidence > 3.0

@@ -57,4 +57,7 @@ def told_apart(done: Sequence[Trial], meant: float) -> list[Trial]:
             if gain < meant:
                 # A clock is an ordinary doubt of every rig, a lag is not
                 out[i] = replace(lag, evidence=clock.evidence - max(0.0, -gain))
+            elif lag.evidence < clock.evidence and lag.candidate.where == clock.candidate.where:
+                # What the device showed before a piece began is open: that costs the lag, and says nothing
+                out[i] = replace(lag, evidence=clock.evidence + gain)
     return sorted(out, key=lambda t: (-t.evidence, t.candidate.effect == "sensor_lag"))

@@ -87,7 +87,7 @@ def named(
             # What takes a smaller part away stands in for something: a fit to all pieces says no more of it
             search.rivals += [rival(t, first.evidence - t.evidence) for t in tried.done]
             break
-        search.adopt(tried, first)
+        search.adopt(tried, first, in_passing=known is not None and known.asked)
         if not search.whole:
             search.start = max(search.start, tried.left)
             search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
@@ -145,7 +145,7 @@ def named(
         if best.mismatch.verdict == "explained":
             # All but a trace: a second effect may be that trace, or nothing better is found
             fallback = best
-        if near_noise(best.fitted):
+        if near_noise(best.fitted) and not search.budget.late():
             others = list(_second_choices(ideal, before, tried, notify))
             if others and _wholly(others[-1][0]):
                 found, its = others[-1]

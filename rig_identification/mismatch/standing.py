@@ -45,8 +45,11 @@ class Search:
         """The same search, to go on with by itself."""
         return replace(self, found=list(self.found), rivals=list(self.rivals))
 
-    def adopt(self, tried: Trials, chosen: Trial) -> None:
-        """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals."""
+    def adopt(self, tried: Trials, chosen: Trial, *, in_passing: bool = False) -> None:
+        """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals.
+
+        in_passing: what it leads to is adopted next.
+        """
         self.found.append(chosen)
         others = [
             (chosen.evidence - t.evidence, t)
@@ -57,7 +60,7 @@ class Search:
         self.bodies = ()
         if self.whole:
             self.bodies = tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in others)
-        self.here, self.evaluation = adopted(self.here, self.evaluation, chosen)
+        self.here, self.evaluation = adopted(self.here, self.evaluation, chosen, in_passing=in_passing)
 
 
 def short_pieces(ideal: Ideal) -> tuple[Problem, Evaluation | None] | None:

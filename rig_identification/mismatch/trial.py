@@ -91,8 +91,13 @@ def earned_evidence(problem: Problem, before: Evaluation, after: Evaluation, *, 
     return log_evidence(after) - (0.0 if far else unearned(problem, before, after.runs))
 
 
-def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Problem, Evaluation]:
-    """A trial's effect in the model of all pieces, fitted."""
+def adopted(
+    problem: Problem, evaluation: Evaluation, trial: Trial, *, in_passing: bool = False
+) -> tuple[Problem, Evaluation]:
+    """A trial's effect in the model of all pieces, fitted.
+
+    in_passing: what it leads to is known and comes next; nothing is fitted without that.
+    """
     wide = extended(problem, (trial.candidate,))
     if len(wide.runs) == len(trial.problem.runs):
         return trial.problem, trial.evaluation
@@ -105,6 +110,14 @@ def adopted(problem: Problem, evaluation: Evaluation, trial: Trial) -> tuple[Pro
         for run, start in zip(trial.problem.runs, trial.evaluation.point.starts, strict=True)
     }
     point = replace(point, theta=theta)
+    if in_passing:
+        starts = tuple(
+            known.get((run.recording.name, run.offset)) or start
+            for run, start in zip(wide.runs, point.starts, strict=True)
+        )
+        there = evaluate(wide, replace(point, starts=starts))
+        if there is not None:
+            return wide, there
     starts = tuple(
         known.get((run.recording.name, run.offset)) or _begun(wide, run, point, start)
         for run, start in zip(wide.runs, point.starts, strict=True)
