@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, needed_gain
 from rig_identification.mismatch.screen import Promise, carried, extended, promises_of
-from rig_identification.mismatch.trial import log_evidence
+from rig_identification.mismatch.trial import log_evidence, promised
 from rig_identification.mismatch.unbent import as_described, at_first
 
 #: Where fits start, in std of a number's prior.
@@ -109,7 +109,7 @@ class BothAtRest:
     second: Candidate
     evidence: float  # log evidence at rest, each as one place of many
     problem: Problem  # with both in
-    start: Evaluation  # of the motion: the rig as it hangs with both, and the likelier body
+    starts: tuple[Evaluation, ...]  # of the motion, what leaves least first
 
 
 def both_at_rest(
@@ -144,9 +144,15 @@ def both_at_rest(
     out = []
     for told, first, second, wide, fitted in likely:
         moving = extended(problem, (first, second))
-        begun = _begun(moving, evaluation, carried(moving, wide, fitted.point).theta)
-        if begun is not None:
-            out.append(BothAtRest(first, second, told, moving, begun))
+        # The rig as it hangs, with the likelier body, and where the search stands with nothing else changed
+        hanging = _begun(moving, evaluation, carried(moving, wide, fitted.point).theta)
+        values = wide.bench.parameters.named(fitted.point.theta)
+        point = carried(moving, problem, evaluation.point)
+        for candidate in (first, second):
+            point = promised(moving, point, candidate, values, evaluation)
+        starts = [s for s in (hanging, evaluate(moving, point)) if s is not None]
+        starts.sort(key=lambda s: s.cost)
+        out.append(BothAtRest(first, second, told, moving, tuple(starts)))
     return out
 
 

@@ -219,7 +219,7 @@ class _Look:
     certain: list[Trial] = field(default_factory=list)  # what rest asks for, beside something that moves
     beside: dict[str, list[Trial]] = field(default_factory=dict)  # that something else, by label
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
-    moving: bool = False  # whether rest says next to nothing of what is left, and no number promises much
+    moving: bool = False  # whether rest asks for next to nothing, and no change of numbers promises much
     rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
 
@@ -345,7 +345,7 @@ class _Look:
         if not self.enough:
             self.certain = self._certain(asked) or self._two_at_rest(asked)
         soon = max((p.share for p in self.promises if not p.candidate.slow), default=0.0)
-        self.moving = most < WORTH * excess(self.seen) and soon < CHIEF
+        self.moving = most < BEATEN and soon < CHIEF
 
     def _certain(self, asked: list[AtRest]) -> list[Trial]:
         """What rest asks for beyond doubt beside another effect of the motion, likeliest first.
@@ -396,7 +396,7 @@ class _Look:
         out: dict[str, Trial] = {}
         for pair in both_at_rest(self.here, self.seen, asked, self.candidates, self.budget):
             self.notify(f"{pair.first.label}, and {pair.second.label}")
-            second = fitted_from(pair.second, pair.problem, pair.start, self.budget)
+            second = fitted_from(pair.second, pair.problem, pair.starts, self.budget)
             if second is None or not at_noise(second):
                 continue
             problem = extended(self.here, (pair.first,))

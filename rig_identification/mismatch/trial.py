@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -174,14 +174,23 @@ def attempt(
 
 
 def fitted_from(
-    candidate: Candidate, problem: Problem, start: Evaluation, budget: Budget = UNLIMITED
+    candidate: Candidate, problem: Problem, starts: Sequence[Evaluation], budget: Budget = UNLIMITED
 ) -> Trial | None:
-    """A trial of a hypothesis that the problem has in it, fitted from ``start``; None where none starts."""
-    try:
-        fitted, settled = _first_steps(problem, start.point, LAST_STEPS, budget.spent)
-    except FloatingPointError:
-        return None
-    return Trial(candidate, problem, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+    """A trial of a hypothesis that the problem has in it, from where of ``starts`` least is left in the end."""
+    best: Trial | None = None
+    for start in starts:
+        if best is not None and budget.spent():
+            break
+        try:
+            fitted, settled = _first_steps(problem, start.point, LAST_STEPS, budget.spent)
+        except FloatingPointError:
+            continue
+        settled = settled and misfit(fitted) < NEAR_SQUARE
+        if best is None or fitted.cost < best.evaluation.cost:
+            best = Trial(candidate, problem, fitted, log_evidence(fitted), settled)
+        if settled:
+            break
+    return best
 
 
 def _placed(begun: Point, promised: Point, problem: Problem, candidate: Candidate) -> Point:
