@@ -176,7 +176,7 @@ def attempt(
 def fitted_from(
     candidate: Candidate, problem: Problem, starts: Sequence[Evaluation], budget: Budget = UNLIMITED
 ) -> Trial | None:
-    """A trial of a hypothesis that the problem has in it, from where of ``starts`` least is left in the end."""
+    """A trial of a hypothesis that is in the problem, from that of ``starts`` that leads furthest."""
     best: Trial | None = None
     for start in starts:
         if best is not None and budget.spent():
