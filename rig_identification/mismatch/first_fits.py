@@ -158,6 +158,14 @@ def begun(
     return standing.out
 
 
+def leaving_nothing(first: Trial, promise: Promise, budget: Budget) -> Trial | None:
+    """A second hypothesis beside a first one, fitted from a promise; None where they leave more than noise."""
+    second = attempt(first.problem, first.evaluation, promise, budget)
+    if second is not None and almost(second, first.evaluation):
+        second = finished(second, budget)
+    return second if second is not None and at_noise(second) else None
+
+
 def leading(
     tried: list[Trial],
     left: float,
@@ -198,10 +206,8 @@ def leading(
         for promise in worth_a_fit(promises, count_of(others))[:FURTHER]:
             if promise.share < DIRECT or promise.candidate.build is not None:
                 continue
-            second = attempt(first.problem, first.evaluation, promise, budget)
-            if second is not None and almost(second, first.evaluation):
-                second = finished(second, budget)
-            if second is None or not at_noise(second):
+            second = leaving_nothing(first, promise, budget)
+            if second is None:
                 continue
             if best is None or second.evidence > best[1].evidence:
                 best = first, second

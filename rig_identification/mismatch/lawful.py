@@ -24,6 +24,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import AT_NOISE, BEATEN
+from rig_identification.mismatch.look import MEANT, Law, Trials
 from rig_identification.mismatch.measured import fitting_wrench
 from rig_identification.mismatch.point_laws import (
     SEEN,
@@ -33,7 +34,7 @@ from rig_identification.mismatch.point_laws import (
     sparser,
 )
 from rig_identification.mismatch.screen import Promise, carried, extended
-from rig_identification.mismatch.search import MEANT, Law, Trials, worst_pieces
+from rig_identification.mismatch.search import worst_pieces
 from rig_identification.mismatch.standing import EXPLAINED, Search
 from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, promised
 from rig_identification.mismatch.whole_rivals import ahead_by

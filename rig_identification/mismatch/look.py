@@ -1,0 +1,565 @@
+"""One look for what explains most of what is left: the witnesses that are asked, and what came of it.
+
+Which is asked after which search.py says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.solve import (
+    POLISH,
+    Evaluation,
+    Problem,
+    evaluate,
+    excess,
+    solve,
+    still_promised,
+)
+from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
+from rig_identification.mismatch.at_rest import AtRest, at_rest, both_at_rest, from_rest
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.first_fits import (
+    BEATEN,
+    CLOSE,
+    DIRECT,
+    RIVAL,
+    Notify,
+    almost,
+    at_noise,
+    begun,
+    leading,
+    leaving_nothing,
+    shows,
+)
+from rig_identification.mismatch.hypotheses import as_likely, compatible, count_of, worth_a_fit
+from rig_identification.mismatch.late import lag_like, told_apart
+from rig_identification.mismatch.locate import find_liar
+from rig_identification.mismatch.same_clock import contradicted
+from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.simpler import fitted_simpler
+from rig_identification.mismatch.supports import gives_way
+from rig_identification.mismatch.trial import (
+    FIRST_STEPS,
+    Trial,
+    among_places,
+    amount_seen,
+    as_it_stands,
+    attempt,
+    beyond_doubt,
+    earned_evidence,
+    finished,
+    fitted_from,
+    log_evidence,
+    ordinary_errors,
+)
+from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, unbent
+
+#: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
+#: than so much and whole runs do not refute it.
+Law = Callable[[Problem, Evaluation, float], Explained | None]
+
+#: Hypotheses that get to their end.
+FINISHED = 3
+#: Share of what was left that no stand-in comes down to: one bends to most of what it stands in for, and
+#: leaves a part in ten or in a hundred of it.
+NEXT_TO_NONE = 1e-3
+#: What gives way or swings that is tried before changes of numbers which promise less.
+AT_ONCE = 3
+#: Log evidence that an effect has to gain.
+MEANT = 3.0
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Hypotheses fitted in full, most likely first, and the device that contradicts all others."""
+
+    done: list[Trial]
+    liar: str | None = None
+    beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
+    lawful: Explained | None = None  # what explains the session instead
+    led: bool = False  # the first leads to another one, with which nothing is left
+    chief: bool = True  # whether the first takes the larger part of what was left away
+    beside: tuple[Trial, ...] = ()  # what it leads to, likeliest first, where that is fitted already
+    asked: bool = False  # whether rivals of that were asked as well
+    left: float = 0.0  # nats, without any of them
+
+
+@dataclass
+class Look:
+    """One look for what explains most of what is left: what has been tried so far, and on what."""
+
+    problem: Problem  # in which devices are heard one without the other, and where it stands
+    evaluation: Evaluation
+    here: Problem  # what hypotheses are fitted to, and what they are to explain
+    seen: Evaluation
+    candidates: list[Candidate]
+    promises: list[Promise]
+    mass: float  # kg, of the body
+    far: bool  # whether much is left
+    notify: Notify
+    budget: Budget
+    law: Law | None
+    fitted: Trial | None = None  # before, to ``here`` about ``seen``
+    tried: list[Trial] = field(default_factory=list)
+    device: str | None = None  # that contradicts all others
+    lawful: Explained | None = None
+    certain: list[Trial] = field(default_factory=list)  # what rest asks for, beside something that moves
+    beside: dict[str, list[Trial]] = field(default_factory=dict)  # that something else, by label
+    hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
+    moving: bool = False  # whether rest asks for next to nothing, and no change of numbers promises much
+    rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
+    refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
+
+    @property
+    def count(self) -> int:
+        """Number of hypotheses."""
+        return count_of(self.candidates)
+
+    @property
+    def needed(self) -> float:
+        """Log evidence that is worth telling."""
+        return log_evidence(self.seen) + MEANT
+
+    @property
+    def at_noise(self) -> bool:
+        """Whether anything that was tried leaves only noise."""
+        return any(at_noise(t) for t in self.tried)
+
+    @property
+    def enough(self) -> bool:
+        """Whether anything that was tried leaves only noise, or next to nothing of what was left."""
+        return any(self._enough(t) for t in self.tried)
+
+    @property
+    def almost(self) -> bool:
+        """Whether anything that was tried leaves little of what was left, and yet more than noise."""
+        return any(almost(t, self.seen) for t in self.tried)
+
+    @cached_property
+    def left(self) -> float:
+        """What is left without any of them (nats), with the recordings weighed as they are here.
+
+        Where the search begins channels were weighed by their residuals (cautious.py): rest may be far off
+        there, and the runs less than any fit that heeds rest leaves of them.
+        """
+        there = excess(self.seen)
+        if not self.far:
+            return there
+        try:
+            fitted, _ = solve(
+                self.here, self.seen.point, iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH
+            )
+        except FloatingPointError:
+            return there
+        return max(there, excess(fitted)) if fitted.cost < self.seen.cost else there
+
+    def _enough(self, trial: Trial) -> bool:
+        return at_noise(trial) or excess(trial.evaluation) < NEXT_TO_NONE * excess(self.seen)
+
+    def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
+        """First fits of promises about an evaluation; about another one's than ``seen`` all have a chance."""
+        far = self.far and about is None
+        self.tried += begun(
+            self.here, about or self.seen, worthy, far, self.notify, self.budget, known=self.fitted
+        )
+
+    def untried(self, promises: list[Promise]) -> list[Promise]:
+        """Promises of what has not been tried."""
+        known = {t.candidate.label for t in self.tried} | self.hopeless
+        return [p for p in promises if p.candidate.label not in known]
+
+    def directly(self) -> None:
+        """What screening promises.
+
+        Where the residuals as a whole show something, only what takes of it away: a hose that explains
+        twenty nats of four thousand is what it bends to, and its fit takes half a minute.
+        """
+        worthy = worth_a_fit(self.promises, self.count)
+        if not self.far and shows(self.seen):
+            worthy = [p for p in worthy if p.share > WORTH]
+        if self.fitted is not None and all(p.candidate.label != self.fitted.candidate.label for p in worthy):
+            # More than first order promised may have come of it
+            worthy += [p for p in self.promises if p.candidate.label == self.fitted.candidate.label]
+        if not self.far and worthy:
+            worthy += as_likely(self.promises, worthy, MEANT)
+        self.begin(worthy)
+
+    def outright(self) -> None:
+        """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.
+
+        A hose bends to an error of one length or hinge, which promises as much with one number of its own.
+        """
+        soon = max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
+        promised = [
+            p for p in self.promises[:1] if p.candidate.slow and p.share > DIRECT and soon < CLOSE * p.gain
+        ]
+        self.notify("cables that stretch")
+        stretched = stretching(self.here, self.seen, self.mass)
+        promised += [] if stretched is None or stretched.share < DIRECT else [stretched]
+        self.begin(promised)
+        self.ringing()
+        self.hopeless = {p.candidate.label for p in self.untried(promised)} if not self.at_noise else set()
+
+    def ringing(self) -> None:
+        """Ceilings that ring as a part on springs does that was fitted: a ceiling rings with the body."""
+        like = ringing_like(self.here, self.tried, self.seen, self.mass)
+        new = [p for p in like if p.candidate.label not in self.rung]
+        self.rung |= {p.candidate.label for p in new}
+        self.begin(new)
+
+    def at_rest(self) -> None:
+        """What the static recordings ask for by themselves, started where they have it.
+
+        What explains them about as well as one that leaves only noise gets its turn beside it: an upper hinge
+        that is off is alike to a ceiling off level.
+        """
+        self.notify("what rest asks for")
+        asked = at_rest(self.here, self.seen, self.candidates, self.budget, self.promises)[:MOST]
+        most = max((a.promise.gain for a in asked), default=0.0)
+        for found in asked:
+            behind = most - found.promise.gain
+            if self.budget.spent() or (self.at_noise and behind > BEATEN):
+                break
+            start = from_rest(self.here, self.seen, found)
+            starts = [self.seen] if start is None else [start, self.seen]
+            if gives_way(self.here.bench.parameters.model):
+                # With something that swings or rings in the model a fit takes many seconds
+                starts = [min(starts, key=lambda s: s.cost)]
+            self.notify(found.promise.candidate.label)
+            trial, _ = best_of(self.here, starts, found.promise, self.budget)
+            if trial is not None:
+                self.tried.append(trial)
+        if not self.enough:
+            self.certain = self._certain(asked) or self._two_at_rest(asked)
+        soon = max((p.share for p in self.promises if not p.candidate.slow), default=0.0)
+        self.moving = most < BEATEN and soon < CHIEF
+
+    def _certain(self, asked: list[AtRest]) -> list[Trial]:
+        """What rest asks for beyond doubt beside another effect of the motion, likeliest first.
+
+        One that takes nearly all of the motion's residual away, and leaves too much for noise, is certain by
+        itself. Of those with which all is quiet at rest one is right. The motion tells which, once what it
+        has besides is in the model: where one more effect leaves only noise they are as likely as with it.
+        """
+        least = max(BEATEN, max((a.promise.gain for a in asked), default=0.0) - BEATEN)
+        sure = {id(a.promise.candidate): a for a in asked if a.promise.gain > least}
+        alike = sorted((t for t in self.tried if id(t.candidate) in sure), key=lambda t: -t.evidence)
+        if not alike:
+            return []
+        if excess(alike[0].evaluation) <= (1.0 - DIRECT) * excess(self.seen):
+            first = self.finished(alike[0])
+            return [] if first is None else [first]
+        settled = [t for t in alike if sure[id(t.candidate)].settles]
+        ended = [t for t in map(self.finished, settled) if t is not None]
+        if not ended:
+            return []
+        ended.sort(key=lambda t: -t.evidence)
+        self.notify(f"{ended[0].candidate.label}, and one more")
+        others = compatible(self.candidates, [ended[0].candidate])
+        promises = screen(ended[0].problem, ended[0].evaluation, others, self.mass)
+        if not promises or promises[0].share < DIRECT:
+            return []
+        sought = promises[0].candidate
+        out = []
+        for trial in ended:
+            if self.budget.spent() or not compatible([sought], [trial.candidate]):
+                continue
+            self.notify(f"{trial.candidate.label}, and {sought.label}")
+            second = leaving_nothing(trial, promises[0], self.budget)
+            if second is not None:
+                out.append(replace(trial, evidence=second.evidence))
+                self.beside[trial.candidate.label] = [second]
+        return out
+
+    def _two_at_rest(self, asked: list[AtRest]) -> list[Trial]:
+        """Of two errors that both show at rest: the one that rest asks more of; the motion decides.
+
+        Equilibrium with both is explained where with either it is not, and a fit to it takes a few hundredths
+        of a second. Where the motion leaves only noise with both, the other one is known as well.
+        """
+        if not asked:
+            return []
+        self.notify("what rest asks for, two at once")
+        out: dict[str, Trial] = {}
+        for pair in both_at_rest(self.here, self.seen, asked, self.candidates, self.budget):
+            self.notify(f"{pair.first.label}, and {pair.second.label}")
+            second = fitted_from(pair.second, pair.problem, pair.starts, self.budget)
+            if second is None or not at_noise(second):
+                continue
+            problem = extended(self.here, (pair.first,))
+            alone = evaluate(problem, carried(problem, pair.problem, second.evaluation.point))
+            if alone is None:
+                continue
+            label = pair.first.label
+            if label not in out or second.evidence > out[label].evidence:
+                out[label] = Trial(pair.first, problem, alone, second.evidence)
+            self.beside.setdefault(label, []).append(second)
+            self.beside[label].sort(key=lambda t: -t.evidence)
+        return sorted(out.values(), key=lambda t: -t.evidence)
+
+    def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
+        """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
+        self.notify("from where nothing is bent")
+        about = unbent(self.here, self.seen)
+        first = None if guess is None else at_first(self.here, self.seen, guess)
+        starts = [e for e in (about, first) if e is not None]
+        again = [] if about is None else screen(self.here, about, self.candidates, self.mass)
+        known: set[str] = set()
+        for promise in likely(self.promises, again):
+            label = promise.candidate.label
+            if self.budget.spent() or self.at_noise:
+                break
+            if label in known or any(t.candidate.label == label and self._decided(t) for t in self.tried):
+                continue
+            self.notify(label)
+            trial, alike = best_of(self.here, starts, promise, self.budget)
+            if trial is not None:
+                self.tried.append(trial)
+            if alike:
+                known.add(label)
+
+    def _decided(self, trial: Trial) -> bool:
+        """Whether starting a hypothesis from what the other screening promised of it is of no use."""
+        return trial.settled or excess(trial.evaluation) > CHIEF * excess(self.seen)
+
+    def leading(self) -> Trial | None:
+        """Far from the noise: what leaves nothing together with one more; see :func:`first_fits.leading`."""
+        if not self.far or self.at_noise or not self.tried:
+            return None
+        found = leading(
+            list(self.tried),
+            self.left,
+            self.candidates,
+            self.mass,
+            self.notify,
+            self.budget,
+            self.finished,
+            self.refused,
+        )
+        self.refused = len(self.tried)
+        if found is None:
+            return None
+        first, second = found
+        others = compatible(self.candidates, [first.candidate])
+        seconds = [second, *fitted_simpler(first.problem, second, others)]
+        self.beside[first.candidate.label] = sorted(seconds, key=lambda t: -t.evidence)
+        return first
+
+    def finished(self, trial: Trial) -> Trial | None:
+        """A trial fitted to its end, which takes its place among what was tried."""
+        ended = finished(trial, self.budget)
+        if ended is not None:
+            self.tried = [ended if t is trial else t for t in self.tried]
+        return ended
+
+    def told(self, done: list[Trial]) -> list[Trial]:
+        """Trials, likeliest first, with special cases of each, and the lag beside every late clock.
+
+        A clock that leaves only noise keeps its lag from being tried, and with one more effect it may leave
+        as little as the lag by itself. A clock that its stamps contradict is told only where nothing else
+        is about as likely.
+        """
+        out = list(done)
+        for clock in done:
+            lag = lag_like(clock, self.candidates)
+            if lag is None or any(t.candidate.label == lag.candidate.label for t in out):
+                continue
+            self.notify(lag.candidate.label)
+            begun = attempt(self.here, self.seen, lag, self.budget)
+            twin = None if begun is None else finished(begun, self.budget)
+            if twin is not None and twin.evidence > self.needed:
+                out.append(twin)
+        for trial in done if self.far else ():  # near the noise all were asked
+            known = {t.candidate.label for t in out}
+            for simple in fitted_simpler(self.here, trial, self.candidates):
+                if simple.candidate.label not in known and simple.evidence > self.needed:
+                    out.append(simple)
+        heard = [(t, contradicted(t)) for t in out]
+        likely = max((t.evidence for t, impossible in heard if not impossible), default=-np.inf)
+        out = [t for t, impossible in heard if not impossible or t.evidence - likely > BEATEN]
+        return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
+
+    def without_devices(self) -> None:
+        """What is wrong with the device that contradicts all others, if one does."""
+        if self.problem.bench.parameters.model.internal > 0:
+            # With something that swings in the model such fits take minutes
+            return
+        self.notify("without each device in turn")
+        liar = find_liar(self.problem, self.evaluation, self.budget)
+        if liar is None:
+            return
+        # About the fit that does not hear it, what is wrong with it shows as it is
+        self.device = liar.device
+        about = evaluate(self.problem, liar.point) or self.seen
+        promises = screen(self.problem, about, self.candidates, self.mass)
+        self.begin(worth_a_fit(promises, self.count, self.device), about)
+
+    @cached_property
+    def scanned(self) -> list[Promise]:
+        """What gives way and what swings, by its best amount."""
+        self.notify("what gives way")
+        return far_promises(self.here, self.seen, self.promises, self.mass, self.budget)
+
+    def giving_way_at_once(self) -> None:
+        """What gives way or swings and promises more than any change of numbers, before these.
+
+        Rest that is quiet has no error of geometry, cells or level in it that would explain so much motion.
+        """
+        soon = max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
+        worthy = sorted((p for p in self.scanned if p.gain > soon), key=lambda p: -p.gain)[:AT_ONCE]
+        worthy = self.untried(worthy)
+        self.begin(worthy)
+        if not self.at_noise:
+            self.hopeless |= {p.candidate.label for p in self.untried(worthy)}
+
+    def giving_way(self) -> None:
+        """What gives way, whatever screening says of it, and all else; the law where that explains it."""
+        worthy = self.untried(self.scanned)
+        known = {p.candidate.label for p in worthy}
+        others = self.untried(worth_a_fit(self.promises, self.count))
+        worthy += [p for p in others if p.candidate.label not in known]
+        worthy.sort(key=lambda p: -p.gain)
+        self.tried += begun(self.here, self.seen, worthy, True, self.notify, self.budget, self._lawfully)
+
+    def yielding_a_little(self) -> None:
+        """Near the noise: what gives way, of which first order says nothing where it rings."""
+        self.notify("what gives way")
+        worthy = self.untried(supports(self.here, self.seen, self.mass, self.budget))
+        self.begin(worth_a_fit(sorted(worthy, key=lambda p: -p.gain), self.count))
+
+    def passed_over(self) -> bool:
+        """Whether there is a number of the rig left to try, where nothing that was tried makes sense.
+
+        Of two effects at once a third one of many numbers may promise more than either, keep it, and have an
+        amount that may as well be none.
+        """
+        rest = [p for p in self.untried(self.promises) if not p.candidate.slow]
+        self.tried = []
+        self.begin(worth_a_fit(rest, self.count))
+        return bool(self.tried)
+
+    def giving_way_beside(self) -> list[Trial]:
+        """What takes the larger part away and leaves nothing beside what gives way, likeliest first.
+
+        A clock that is off and a ceiling that yields: without the clock nothing that the ceiling promises
+        is to be seen. What is alike to the clock, a lag, is asked beside the same ceiling.
+        """
+        chief = CHIEF * self.left
+        plain = [t for t in self.tried if t.candidate.build is None and excess(t.evaluation) < chief]
+        plain.sort(key=lambda t: excess(t.evaluation))
+        if not plain or gives_way(plain[0].problem.bench.parameters.model):
+            return []
+        self.notify(f"{plain[0].candidate.label}, and what gives way")
+        promises = supports(plain[0].problem, plain[0].evaluation, self.mass, self.budget)
+        best = max(promises, key=lambda p: p.gain, default=None)
+        if best is None or best.share < CHIEF:
+            return []
+        out: dict[str, Trial] = {}
+        for first in plain[:FINISHED]:
+            label = first.candidate.label
+            alike = excess(first.evaluation) < 2.0 * excess(plain[0].evaluation)
+            if self.budget.spent() or label in out or not alike:
+                continue
+            self.notify(f"{label}, and {best.candidate.label}")
+            second = leaving_nothing(first, best, self.budget)
+            if second is not None:
+                out[label] = replace(first, evidence=second.evidence)
+                self.beside[label] = [second]
+        return sorted(out.values(), key=lambda t: -t.evidence)
+
+    def leads(self, done: list[Trial], *, asked: bool = False) -> Trials:
+        """Trials of which the first leads to another one, with which nothing is left.
+
+        asked: whether rivals of that other one were asked as well.
+        """
+        told = self.told(done)
+        beside = self.beside.get(told[0].candidate.label, ())
+        return Trials(told, led=True, beside=tuple(beside), asked=asked, left=self.left)
+
+    def _lawfully(self) -> bool:
+        """Whether a law explains it all."""
+        if self.law is not None:
+            self.notify("a force that follows one point's motion")
+            self.lawful = self.law(self.here, self.seen, self.needed)
+        return self.lawful is not None
+
+    def _fair(self, trial: Trial) -> Trial:
+        """Near the noise: less what the trial only gains from the noise."""
+        evidence = earned_evidence(self.here, self.seen, trial.evaluation, far=self.far)
+        return replace(trial, evidence=evidence)
+
+    def _missed(self, trial: Trial) -> bool:
+        """Whether more is left without a trial, about where it ends: a change of numbers alone.
+
+        Far along a curved valley an amount's std says little of how clear of none it lies.
+        """
+        if trial.candidate.build is not None:
+            return False
+        point = carried(self.here, trial.problem, trial.evaluation.point)
+        try:
+            without, _ = solve(self.here, point, iterations=FIRST_STEPS, tolerance=0.5)
+        except FloatingPointError:
+            return False
+        return trial.evidence > log_evidence(without) + MEANT
+
+    def _rivals(self, trial: Trial, best: Trial) -> bool:
+        """Whether a trial may yet come near the noise, as ``best`` does."""
+        left = excess(trial.evaluation)
+        return trial.candidate.label != best.candidate.label and left < CHIEF * excess(self.seen)
+
+    def ended(self, limit: float) -> Trials:
+        """The likeliest of what was tried, fitted to its end. limit: of ordinary errors, in tolerances."""
+        if not self.tried:
+            return Trials([], self.device)
+        ordinary = ordinary_errors(self.problem)
+        tried = sorted((self._fair(t) for t in self.tried), key=lambda t: -t.evidence)
+        done: list[Trial] = []
+        beaten: list[Trial] = []
+        for trial in tried:
+            last = any(self._enough(t) for t in done) and _beaten(trial, done, tried[0], self.far)
+            if len(done) == FINISHED or ((last or (done and self.budget.spent())) and not trial.settled):
+                continue
+            self.notify(trial.candidate.label)
+            # Where nothing comes near it whole runs take it to its end
+            lone = self.far and at_noise(trial) and trial.candidate.closer is None
+            lone = lone and not any(self._rivals(t, trial) for t in self.tried)
+            # What is beaten is stated as it is: a closer description of it takes half a minute
+            plain = replace(trial, candidate=replace(trial.candidate, closer=None)) if last else trial
+            ended = as_it_stands(plain) if lone else finished(plain, self.budget)
+            if ended is None or not beyond_doubt(ended, ordinary, limit):
+                continue
+            if not self.far and not amount_seen(ended) and not self._missed(ended):
+                # It explains something, with an amount that may as well be none: it stands in for another
+                continue
+            ended = self._fair(ended)
+            if ended.evidence > self.needed:
+                _place(ended, beaten if last else done)
+        told = self.told(done)
+        chief = bool(told) and excess(told[0].evaluation) < CHIEF * self.left
+        return Trials(told, self.device, tuple(map(among_places, beaten)), chief=chief, left=self.left)
+
+
+def _place(trial: Trial, among: list[Trial]) -> None:
+    """Add a trial; of two descriptions that have the same closer one the likelier."""
+    same = next((t for t in among if t.candidate.label == trial.candidate.label), None)
+    if same is None:
+        among.append(trial)
+    elif trial.evidence > same.evidence:
+        among[among.index(same)] = trial
+
+
+def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
+    """Whether a hypothesis is no rival of those that reached the noise, by its first steps."""
+    if far:
+        return excess(trial.evaluation) > RIVAL * excess(first.evaluation)
+    # A curved valley takes more steps than the first ones
+    ahead = 0.0 if trial.settled else still_promised(trial.problem, trial.evaluation)
+    return trial.evidence + ahead < max(t.evidence for t in done) - BEATEN
