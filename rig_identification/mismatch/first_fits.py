@@ -159,7 +159,7 @@ def begun(
 
 
 def leaving_nothing(first: Trial, promise: Promise, budget: Budget) -> Trial | None:
-    """A second hypothesis beside a first one, fitted from a promise; None where they leave more than noise."""
+    """A second hypothesis beside a first one, from a promise; None where they leave more than noise."""
     second = attempt(first.problem, first.evaluation, promise, budget)
     if second is not None and almost(second, first.evaluation):
         second = finished(second, budget)
