@@ -6,8 +6,8 @@ import time
 
 from numba import njit
 
-from rig_identification import compiling
 from rig_identification.mismatch.budget import UNLIMITED, Budget
+from rig_identification.model import compiling
 
 
 def _compiled_anew() -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from rig_identification import compiling
+from rig_identification.model import compiling
 
 #: Seconds after which no further effect is begun, and no hypothesis fitted any further. What comes after,
 #: whole runs with what was found and a stand-in for what was not, takes up to a minute.

@@ -37,7 +37,7 @@ class _Clock(event.Listener):
 
 
 _CLOCK = _Clock()
-event.register("numba:compile", _CLOCK)  # type: ignore[no-untyped-call]
+event.register("numba:compile", _CLOCK)
 
 
 def seconds() -> float:
