@@ -129,6 +129,11 @@ class Look:
         return log_evidence(self.seen) + MEANT
 
     @property
+    def soon(self) -> float:
+        """Most (nats) that anything promises whose fit takes a second or two."""
+        return max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
+
+    @property
     def at_noise(self) -> bool:
         """Whether anything that was tried leaves only noise."""
         return any(at_noise(t) for t in self.tried)
@@ -197,9 +202,10 @@ class Look:
 
         A hose bends to an error of one length or hinge, which promises as much with one number of its own.
         """
-        soon = max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
         promised = [
-            p for p in self.promises[:1] if p.candidate.slow and p.share > DIRECT and soon < CLOSE * p.gain
+            p
+            for p in self.promises[:1]
+            if p.candidate.slow and p.share > DIRECT and self.soon < CLOSE * p.gain
         ]
         self.notify("cables that stretch")
         stretched = stretching(self.here, self.seen, self.mass)
@@ -379,9 +385,9 @@ class Look:
                 out.append(twin)
         for trial in done if self.far else ():  # near the noise all were asked
             known = {t.candidate.label for t in out}
-            for simple in fitted_simpler(self.here, trial, self.candidates):
-                if simple.candidate.label not in known and simple.evidence > self.needed:
-                    out.append(simple)
+            unknown = [c for c in self.candidates if c.label not in known]
+            simpler = fitted_simpler(self.here, trial, unknown)
+            out += [simple for simple in simpler if simple.evidence > self.needed]
         heard = [(t, contradicted(t)) for t in out]
         likely = max((t.evidence for t, impossible in heard if not impossible), default=-np.inf)
         out = [t for t, impossible in heard if not impossible or t.evidence - likely > BEATEN]
@@ -413,8 +419,7 @@ class Look:
 
         Rest that is quiet has no error of geometry, cells or level in it that would explain so much motion.
         """
-        soon = max((p.gain for p in self.promises if not p.candidate.slow), default=0.0)
-        worthy = sorted((p for p in self.scanned if p.gain > soon), key=lambda p: -p.gain)[:AT_ONCE]
+        worthy = sorted((p for p in self.scanned if p.gain > self.soon), key=lambda p: -p.gain)[:AT_ONCE]
         worthy = self.untried(worthy)
         self.begin(worthy)
         if not self.at_noise:
