@@ -44,7 +44,7 @@ def drive(run: Run, parameters: ParameterSet, theta: Array) -> Input:
     """The measured exciter force at the nodes, its clock and its low-pass undone.
 
     Stamps that are late by d, of cells that follow with a time constant tau, tell of the force
-        F(t) = (1 + tau d/dt) f(t + d) = f + (d + tau) f' + (d^2/2 + tau d) f'' + ...
+        F(t) = (1 + tau d/dt) f(t + d) = f(t + d) + tau f'(t + d)
     To first order both are one; (w tau)^2/2 of the amplitude at angular frequency w tells them apart.
     """
     quiet = Input.none(run.grid.nodes, run.grid.step)
@@ -52,12 +52,9 @@ def drive(run: Run, parameters: ParameterSet, theta: Array) -> Input:
         return quiet
     device, places = parameters.device(theta), parameters.places
     late, tau = device[places.exciter_clock], device[places.lag("exciter")]
-    # By smoothed derivatives: resampling anew at each clock value would move the noise as well, and
-    # the cost with it, in a way that no derivative describes
-    rate, bend = run.force.rate, run.force.bend
-    force = run.force.values + (late + tau) * rate + (0.5 * late + tau) * late * bend
-    # Exact in the clock; in the time constant but for tau f'', which next to f' is small
-    return Input(run.grid.step, force, rate + (late + tau) * bend, quiet.wrench, run.force.middle)
+    force, middle, rate, bend = run.force.late_by(late)
+    # Its rate is what either time changes; of the time constant but for tau f'', which next to f' is small
+    return Input(run.grid.step, force + tau * rate, rate + tau * bend, quiet.wrench, middle)
 
 
 def start_basis(model: RigModel, state: State) -> Array:

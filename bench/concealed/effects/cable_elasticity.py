@@ -54,9 +54,11 @@ class CableElasticity(Effect):
     def tension(self, model: Any, data: Any, scene: Scene) -> Array:
         """See :class:`Effect`."""
         stiffness, damping = self._constants(scene)
-        n = len(stiffness)
-        stretch = np.maximum(data.ten_length[:n] - scene.geometry.length, 0.0)
-        return np.asarray(stiffness * stretch + damping * data.ten_velocity[:n])
+        # By name: another effect's tendon may come before the cables
+        cables = [data.tendon(f"cable_{i}") for i in range(len(stiffness))]
+        length, rate = np.array([[c.length[0], c.velocity[0]] for c in cables]).T
+        stretch = np.maximum(length - scene.geometry.length, 0.0)
+        return np.asarray(stiffness * stretch + damping * rate)
 
     def _constants(self, scene: Scene) -> tuple[Array, Array]:
         stiffness = self.axial_stiffness / scene.geometry.length

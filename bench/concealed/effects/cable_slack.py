@@ -63,8 +63,9 @@ class CableSlack(Effect):
     def tension(self, model: Any, data: Any, scene: Scene) -> Array:
         """See :class:`Effect`."""
         out = np.zeros(len(scene.geometry.length))
+        first = model.tendon("cable_0").id  # another effect's tendon may come before the cables
         for row in np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON):
-            out[data.efc_id[row]] = data.efc_force[row]
+            out[data.efc_id[row] - first] = data.efc_force[row]
         return out
 
     def observe(self, scene: Scene, paths: Sequence[Trajectory]) -> dict[str, Any] | None:
