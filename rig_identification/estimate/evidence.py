@@ -18,6 +18,7 @@ from rig_identification.estimate.sampling import (
     cubic_error,
     group_by_node,
     node_input,
+    noise_felt,
 )
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
@@ -61,6 +62,7 @@ class Channel:
     noise_estimated: bool
     group: Index  # (n,)
     node: Index  # (groups,)
+    felt: float = 1.0  # std of the exciter's noise that a group feels at once, in that of an interval's mean
 
     @property
     def width(self) -> int:
@@ -157,6 +159,12 @@ def _channel(
     std, estimated = noise_std(rig, noise, time, values)
     group, node = group_by_node(grid, time)
     return Channel(device, quantity, columns, unit, time, values, std, estimated, group, node)
+
+
+def _felt(grid: Grid, time: Array, channel: Channel) -> Channel:
+    """The channel, with what it feels of the noise of a force that is sampled at ``time``."""
+    sampler = Sampler(grid, channel.time, channel.group, channel.node.size)
+    return replace(channel, felt=noise_felt(grid, time, sampler, channel.node.size))
 
 
 def heard_apart(rig: Rig, part: Run) -> Run:
@@ -286,4 +294,6 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
         force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
         unknown = known.unknown
     channels = tuple(c for c in found if c is not None)
+    if force is not None:
+        channels = tuple(_felt(grid, known.time, c) for c in channels)
     return Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)

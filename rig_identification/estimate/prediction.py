@@ -124,6 +124,7 @@ class Linearised:
     variance: Array  # (m,) sensor noise of each row
     row_H: Array  # (m, 12 + 2 s) response of each row to the state at its node
     row_D: Array  # (m, 6) ... and to the wrench
+    felt: Array  # (m, 6) ... and to the wrench that noise stands for
     Q: Array  # (N, 6, 6) covariance of the wrench that noise stands for
     latent: Array  # (N, 6) wrench noise that the nominal motion holds
     readings: dict[str, sensors.Reading]  # each device at the nodes
@@ -140,7 +141,7 @@ class Linearised:
             # Nothing moves the body but what is known: no sample tells anything of the next one
             return np.zeros((self.nodes.size, self.row_H.shape[1] + 6)), np.sqrt(self.variance)
         A, B, _, _, _ = self.motion.derivatives
-        gains, deviations = filter_of(A, B, self.Q, self.nodes, self.row_H, self.row_D, self.variance)
+        gains, deviations = filter_of(A, B, self.Q, self.nodes, self.row_H, self.felt, self.variance)
         return np.asarray(gains), np.asarray(deviations)
 
 
@@ -322,10 +323,14 @@ def linearise_run(
     )
     plain = columns[:, 0].copy()
     Q = force_noise(run, parameters, theta)
+    felt = D
+    if extra_noise is None and latent is None:
+        # What only noise stands for reaches a sample by way of nodes; a wrench that really acts, as it is
+        felt = np.array([c.felt for c in run.channels])[which, None] * D if run.channels else D
     if extra_noise is not None:
         Q = Q + extra_noise
     if np.any(Q):
-        log_spread = float(whiten(motion.A, motion.B, Q, held, at, H, D, variance, columns))
+        log_spread = float(whiten(motion.A, motion.B, Q, held, at, H, felt, variance, columns))
     else:
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
@@ -346,6 +351,7 @@ def linearise_run(
         variance,
         H,
         D,
+        felt,
         Q,
         held,
         readings,
@@ -366,7 +372,7 @@ def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array,
         linearised.latent,
         linearised.nodes,
         linearised.row_H,
-        linearised.row_D,
+        linearised.felt,
         linearised.variance,
         linearised.plain,
         np.zeros((motion.states.shape[1],) * 2) if start is None else start,

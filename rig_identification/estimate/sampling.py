@@ -260,6 +260,26 @@ def smoothed_input(grid: Grid, nodes: Array) -> SmoothInput:
     return SmoothInput(CubicSpline(grid.step * np.arange(grid.nodes), twice), grid.step, 0, grid.nodes)
 
 
+#: Nodes between two of the samples whose weights are looked at: none reaches that far.
+APART = 40
+
+
+def noise_felt(grid: Grid, time: Array, sampler: Sampler, groups: int) -> float:
+    """Standard deviation of the noise that an input's samples bring to a grouped sample at once.
+
+    In units of what a mean over one node interval brings. Nodes come from samples on both sides, and groups
+    from nodes on both sides: less of the noise is left than the interval's own.
+    """
+    every = max(1, round(APART * grid.step * time.size / max(float(time[-1] - time[0]), grid.step)))
+    chosen = np.arange(every // 2, time.size, every)
+    impulses = np.zeros((time.size, 1))
+    impulses[chosen] = 1.0
+    weights, _ = sampler.at(0.0)
+    heard = weights @ node_input(grid, time, impulses, np.inf).values
+    variance = float(np.sum(heard**2)) / chosen.size * time.size / groups
+    return float(np.sqrt(variance * grid.step * time.size / max(float(time[-1] - time[0]), grid.step)))
+
+
 #: Frequencies over which a spectrum is averaged, Hz.
 AVERAGED_OVER = 1.0
 

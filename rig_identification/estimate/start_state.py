@@ -17,9 +17,14 @@ from rig_identification.estimate.prediction import (
     model_at,
     start_basis,
 )
+from rig_identification.model import layout
 from rig_identification.model.motion import State, on_cables
 
 Array = NDArray[np.float64]
+
+#: How far what swings or yields within the rig is from where it hangs when a run starts, in parts of how far
+#: the body may be, and the rate (1/s) of that: fractions of a second tell both from one another badly.
+INNER, INNER_RATE = 0.005, 10.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ def fit_start(
     """The run's own start state alone, everything else held: what a held-out run may be given.
 
     extra_noise (6, 6): see :func:`linearise_run`. spread: std of a prior on the start about
-    ``start`` (m, rad; twice as much m/s, rad/s). polish: see :func:`solve`. doubted: std, in tolerances,
+    ``start`` (m, rad; twice as much m/s, rad/s; of what swings or yields within the rig INNER of it). polish: see :func:`solve`. doubted: std, in tolerances,
     of what is believed of rig and devices (:class:`_Doubts`).
     """
     p = bench.parameters.size
@@ -91,8 +96,10 @@ def fit_start(
     if current is None:
         return None
     damping, moved_so_far = 1e-9, np.zeros(current.jacobian.shape[1] - p)
-    dof = moved_so_far.size // 2
-    weight = (START_UNIT / spread / np.repeat([1.0, 2.0], dof)) ** 2
+    inner = model.states - layout.BODY_STATE
+    dof = (moved_so_far.size - inner) // 2
+    allowed = [1.0] * dof + [2.0] * dof + [INNER] * (inner // 2) + [INNER * INNER_RATE] * (inner // 2)
+    weight = (START_UNIT / (spread * np.array(allowed))) ** 2
     doubts = _Doubts(p, doubted)
     for _ in range(iterations):
         information, gradient = doubts.eliminated(current)

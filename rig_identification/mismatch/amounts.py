@@ -18,7 +18,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.riders import Swing, rider_candidate
-from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.screen import ELSEWHERE, Promise, carried, extended
 from rig_identification.mismatch.supports import (
     CEILING_FREQUENCY,
     cable_elasticity,
@@ -109,7 +109,7 @@ class Amount:
             options={"xatol": 0.1},
         )
         better = self._promise(amount * float(np.exp(found.x)), -float(found.fun))
-        return max(promise, better, key=lambda p: p.gain)
+        return max(promise, replace(better, elsewhere=promise.elsewhere), key=lambda p: p.gain)
 
     def _promise(self, amount: float, gain: float) -> Promise:
         left = max(1.0, excess(self.evaluation))
@@ -134,7 +134,10 @@ def supports(
             break
         ceilings = [ceiling_candidate(rig, model, mass, axis, frequency=f) for f in CEILING_FREQUENCIES]
         tried = [Amount(problem, evaluation, c, f"ceiling.compliance.{a}") for c in ceilings]
-        found.append(max(((t, t.best(sinks)) for t in tried), key=lambda t: t[1].gain))
+        first, *others = sorted(((t, t.best(sinks)) for t in tried), key=lambda t: -t[1].gain)
+        # Another frequency may lead to another mass and stiffness, and hide as much from a scan of amounts
+        also = tuple(p for _, p in others[:1] if p.gain > ELSEWHERE * first[1].gain)
+        found.append((first[0], replace(first[1], elsewhere=also)))
     out = [promise for _, promise in found]
     finer = {int(np.argmax([promise.gain for promise in out]))}
     if out[0].share > WORTH:  # cables that stretch: see stretching

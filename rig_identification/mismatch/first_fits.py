@@ -146,7 +146,7 @@ def begun(
                 return standing.out
         notify(promise.candidate.label)
         fitted = known is not None and known.candidate.label == promise.candidate.label
-        trial = known if fitted else attempt(problem, evaluation, promise, budget)
+        trial = known if fitted else _furthest(problem, evaluation, promise, far, budget)
         if trial is not None and far and (almost(trial, evaluation) or _coarse(trial, evaluation)):
             # Worth its last steps before any other is tried
             trial = finished(trial, budget) or trial
@@ -158,9 +158,26 @@ def begun(
     return standing.out
 
 
+def _furthest(
+    problem: Problem, evaluation: Evaluation, promise: Promise, far: bool, budget: Budget
+) -> Trial | None:
+    """The first fit of a promise, or of the same elsewhere, that comes to least.
+
+    far: much is left, and only what promises the larger part of it is worth a second start.
+    """
+    best = attempt(problem, evaluation, promise, budget)
+    for other in promise.elsewhere if not far or promise.share > CHIEF else ():
+        if budget.spent():
+            break
+        trial = attempt(problem, evaluation, other, budget)
+        if best is None or (trial is not None and trial.evaluation.cost < best.evaluation.cost):
+            best = trial
+    return best
+
+
 def leaving_nothing(first: Trial, promise: Promise, budget: Budget) -> Trial | None:
     """A second hypothesis beside a first one, from a promise; None where they leave more than noise."""
-    second = attempt(first.problem, first.evaluation, promise, budget)
+    second = _furthest(first.problem, first.evaluation, promise, True, budget)
     if second is not None and almost(second, first.evaluation):
         second = finished(second, budget)
     return second if second is not None and at_noise(second) else None
@@ -203,8 +220,13 @@ def leading(
         notify(f"{first.candidate.label}, and one more")
         others = compatible(candidates, [first.candidate])
         promises = screen(first.problem, first.evaluation, others, mass)
-        for promise in worth_a_fit(promises, count_of(others))[:FURTHER]:
-            if promise.share < DIRECT or promise.candidate.build is not None:
+        chiefly = excess(first.evaluation) < ALMOST * left
+        for k, promise in enumerate(worth_a_fit(promises, count_of(others))[:FURTHER]):
+            if promise.candidate.build is not None:
+                # Fitted slowly, and to first order promises less than it keeps: the best, beside the chief one
+                if k > 0 or not chiefly or promise.share < CHIEF or budget.spent():
+                    continue
+            elif promise.share < DIRECT:
                 continue
             second = leaving_nothing(first, promise, budget)
             if second is None:

@@ -103,6 +103,7 @@ class Look:
     candidates: list[Candidate]
     promises: list[Promise]
     mass: float  # kg, of the body
+    limit: float  # of ordinary errors, in tolerances
     far: bool  # whether much is left
     notify: Notify
     budget: Budget
@@ -122,6 +123,11 @@ class Look:
     def count(self) -> int:
         """Number of hypotheses."""
         return count_of(self.candidates)
+
+    @cached_property
+    def ordinary(self) -> dict[str, float]:
+        """Errors that the lab doubts itself, by name."""
+        return ordinary_errors(self.problem)
 
     @property
     def needed(self) -> float:
@@ -383,15 +389,20 @@ class Look:
             twin = None if begun is None else finished(begun, self.budget)
             if twin is not None and twin.evidence > self.needed:
                 out.append(twin)
-        for trial in done if self.far else ():  # near the noise all were asked
-            known = {t.candidate.label for t in out}
-            unknown = [c for c in self.candidates if c.label not in known]
-            simpler = fitted_simpler(self.here, trial, unknown)
-            out += [simple for simple in simpler if simple.evidence > self.needed]
+        for trial in done:
+            out += self._simpler(trial, {t.candidate.label for t in out})
         heard = [(t, contradicted(t)) for t in out]
         likely = max((t.evidence for t, impossible in heard if not impossible), default=-np.inf)
         out = [t for t, impossible in heard if not impossible or t.evidence - likely > BEATEN]
         return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
+
+    def _simpler(self, trial: Trial, known: set[str]) -> list[Trial]:
+        """Special cases of a trial that are worth telling beside it. known: labels of what is told already."""
+        judged = set() if self.far else {t.candidate.label for t in self.tried}
+        unknown = [c for c in self.candidates if c.label not in known | judged]
+        simpler = map(self._fair, fitted_simpler(self.here, trial, unknown))
+        simpler = (t for t in simpler if t.evidence > self.needed)
+        return [t for t in simpler if self.far or beyond_doubt(t, self.ordinary, self.limit)]
 
     def without_devices(self) -> None:
         """What is wrong with the device that contradicts all others, if one does."""
@@ -520,11 +531,10 @@ class Look:
         left = excess(trial.evaluation)
         return trial.candidate.label != best.candidate.label and left < CHIEF * excess(self.seen)
 
-    def ended(self, limit: float) -> Trials:
-        """The likeliest of what was tried, fitted to its end. limit: of ordinary errors, in tolerances."""
+    def ended(self) -> Trials:
+        """The likeliest of what was tried, fitted to its end."""
         if not self.tried:
             return Trials([], self.device)
-        ordinary = ordinary_errors(self.problem)
         tried = sorted((self._fair(t) for t in self.tried), key=lambda t: -t.evidence)
         done: list[Trial] = []
         beaten: list[Trial] = []
@@ -539,7 +549,7 @@ class Look:
             # What is beaten is stated as it is: a closer description of it takes half a minute
             plain = replace(trial, candidate=replace(trial.candidate, closer=None)) if last else trial
             ended = as_it_stands(plain) if lone else finished(plain, self.budget)
-            if ended is None or not beyond_doubt(ended, ordinary, limit):
+            if ended is None or not beyond_doubt(ended, self.ordinary, self.limit):
                 continue
             if not self.far and not amount_seen(ended) and not self._missed(ended):
                 # It explains something, with an amount that may as well be none: it stands in for another

@@ -4,6 +4,7 @@ Between nodes x_{k+1} = A_k x_k + B_k w_k, w_k being the interval's mean, and a 
 H x_k + D w_k: whatever acts as a wrench can be screened by one pass of this recursion, without running the
 model again. What the run's filter (estimate/whitening.py) has seen of it, state and wrench, is taken away as
 it goes: only what is unseen yet is carried on, and what a sample sees of that is its normalised innovation.
+Its own noise reaches a sample by way of nodes on both sides (estimate/sampling.py), and less of it.
 """
 
 from __future__ import annotations
@@ -18,28 +19,30 @@ Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def _innovations(A, B, node, H, D, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
+def _innovations(A, B, node, H, D, felt, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
     """out (m, c): normalised innovations of the responses to ``wrenches`` (N, 6, c).
 
-    gains (m, X + 6), deviations (m,): the run's filter.
+    felt (m, 6): response of each row to the filter's own noise. gains (m, X + 6), deviations (m,): the filter.
     """
     nodes, states, count = A.shape[0], A.shape[1], wrenches.shape[2]
     size = states + 6
     unseen, after = np.zeros((size, count)), np.empty((states, count))
+    taken = np.empty((6, count))  # what the filter takes for its own noise of this interval
     seen = np.empty(count)
     F = np.empty((states, size))
     row = 0
     for k in range(nodes):
-        for i in range(6):
-            for c in range(count):
-                unseen[states + i, c] = wrenches[k, i, c]
+        taken[:] = 0.0
         while row < node.shape[0] and node[row] == k:
             seen[:] = 0.0
-            for i in range(size):
-                h = H[row, i] if i < states else D[row, i - states]
+            for i in range(states):
+                h = H[row, i]
                 if h != 0.0:
                     for c in range(count):
                         seen[c] += h * unseen[i, c]
+            for i in range(6):
+                for c in range(count):
+                    seen[c] += D[row, i] * wrenches[k, i, c] - felt[row, i] * taken[i, c]
             for c in range(count):
                 seen[c] /= deviations[row]
                 out[row, c] = seen[c]
@@ -47,13 +50,16 @@ def _innovations(A, B, node, H, D, gains, deviations, wrenches, smooth, out):  #
                 g = gains[row, i]
                 if g != 0.0:
                     for c in range(count):
-                        unseen[i, c] -= g * seen[c]
+                        if i < states:
+                            unseen[i, c] -= g * seen[c]
+                        else:
+                            taken[i - states, c] += g * seen[c]
             row += 1
-        if smooth:
-            ahead = min(k + 1, nodes - 1)
-            for i in range(6):
-                for c in range(count):
-                    unseen[states + i, c] += 0.5 * (wrenches[ahead, i, c] - wrenches[k, i, c])
+        ahead = min(k + 1, nodes - 1) if smooth else k
+        for i in range(6):
+            for c in range(count):
+                held = 0.5 * (wrenches[k, i, c] + wrenches[ahead, i, c])
+                unseen[states + i, c] = held - taken[i, c]
         F[:, :states] = A[k]
         F[:, states:] = B[k]
         after[:, :] = np.dot(F, unseen)
@@ -69,7 +75,7 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     A, B, _, _, _ = run.motion.derivatives
     out = np.empty((run.nodes.size, wrenches.shape[2]))
     held = np.ascontiguousarray(wrenches)
-    _innovations(A, B, run.nodes, run.row_H, run.row_D, *run.filter, held, smooth, out)
+    _innovations(A, B, run.nodes, run.row_H, run.row_D, run.felt, *run.filter, held, smooth, out)
     return out
 
 

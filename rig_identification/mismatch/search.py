@@ -81,7 +81,9 @@ def trials(
     led = None
     if more and not far:
         led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
-    look = Look(problem, evaluation, here, seen, candidates, promises, mass, far, notify, budget, law)
+    look = Look(
+        problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, law
+    )
     if led is not None and led.leads:
         return Trials(look.told([led.first]))
     if led is not None and here is problem:
@@ -121,10 +123,10 @@ def trials(
         look.yielding_a_little()
     elif not gives_way(problem.bench.parameters.model):
         look.ringing()
-    found = look.ended(limit)
+    found = look.ended()
     if found.done or far or not more or not look.passed_over():
         return found
-    return look.ended(limit)
+    return look.ended()
 
 
 def _without_support(tried: list[Trial], before: Evaluation) -> bool:
