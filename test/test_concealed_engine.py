@@ -24,7 +24,9 @@ from bench.concealed.effects.hinge import HingeMoments
 from bench.concealed.effects.hinge_damping import HingeDamping
 from bench.concealed.effects.liquid_slosh import LiquidSlosh
 from bench.concealed.effects.load_cell_gain import LoadCellGain
+from bench.concealed.effects.place import released_aside
 from bench.concealed.effects.sensor_lag import SensorLag
+from bench.concealed.effects.tether import Tether
 from bench.concealed.engine import Engine
 from bench.concealed.generate import make_session
 from bench.concealed.inertia import add_point
@@ -112,6 +114,24 @@ def test_newton_and_euler_hold_with_the_true_inertia(moving: tuple[Scene, Trajec
     assert (
         np.abs(np.mean(force - body.mass * acceleration, axis=0)).max() < 1e-6 * body.mass * scene.rig.gravity
     )
+
+
+def test_tensions_are_the_cables_own_beside_a_hose() -> None:
+    """A hose's tendon may come before theirs: in run 12813 of the nineteenth examination it was told as one."""
+    scene = released_aside(draw_scene(1, 4.0))
+    rng = np.random.default_rng(5)
+    hose, stretch = Tether.draw(rng, scene, 0.6), CableElasticity.draw(rng, scene, 0.5)
+    plan = next(p for p in scene.plans if p.kind == "static")
+    engine = Engine(scene, [hose, stretch], plan)
+    assert engine.release() < 1e-4
+    path = engine.stand()
+    force, _, rotation = _forces(scene, path)
+    place = path.position[0] + rotation[0] @ hose.position
+    away = hose.wall - place
+    reach = float(np.linalg.norm(away))
+    pull = hose.stiffness * (reach - hose.reach + hose.preload) * away / reach
+    assert path.tension.min() > 0.0
+    assert np.abs(force[0] + pull).max() < 1e-3 * scene.body.mass * scene.rig.gravity
 
 
 def test_cables_keep_their_length_and_pull(moving: tuple[Scene, Trajectory]) -> None:

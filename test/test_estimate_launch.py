@@ -5,10 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from test_simulate_identify import shaken
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session, pose_problem
 from rig_identification.estimate.launch import Launch
+from rig_identification.estimate.prediction import model_at
+from rig_identification.estimate.whole import predicted
+from rig_identification.mismatch.riders import Swing, rider_candidate
+from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.supports import cable_elasticity
+from rig_identification.model.equilibrium import find_rest
 from rig_identification.recording import Dummy, Session
 from rig_identification.rig import Cable, Mount, Rig
 from rig_identification.simulate import (
@@ -72,3 +79,47 @@ def test_a_tilt_is_not_taken_for_a_body_that_starts_elsewhere() -> None:
     fitted = fit_session(session)
     assert fitted.converged
     assert misfit(fitted.evaluation) < 1.1
+
+
+def test_a_run_is_launched_with_a_liquid_on_cables_that_stretch() -> None:
+    """Tenths of a second tell a liquid half a metre aside badly from a body that starts a little elsewhere."""
+    stiffness, ratio, mass, frequency, damping, place = 2e7, 0.02, 4.0, 0.9, 0.03, (1.2, 1.1, -0.8)
+    effects = {
+        "cable_elasticity": (stiffness,),
+        "cable_damping_ratio": (ratio,),
+        "liquid_slosh.mass": (mass,),
+        "liquid_slosh.frequency": (frequency,),
+        "liquid_slosh.damping_ratio": (damping,),
+        "liquid_slosh.position": place,
+    }
+    spec = shaken(14, 3.0)
+    start = spec.runs[0].start
+    assert isinstance(start, Pulled)
+    far = replace(start, force=2.0 * start.force)
+    spec = replace(spec, runs=(replace(spec.runs[0], start=far),), effects=effects, doubts=False)
+    session, truth = simulate_session(spec, np.random.default_rng(8))
+    problem, theta, _ = pose_problem(session)
+    launch = Launch(problem, theta).from_rest().from_momentum()
+    assert launch.rest is not None
+    body = float(truth.elements[0])
+    stretch = cable_elasticity(session.rig, problem.bench.parameters.model, body)
+    liquid, _ = rider_candidate(problem, Swing("xy", frequency), body, mass, np.array(place))
+    wide = extended(problem, (stretch, liquid))
+    parameters = wide.bench.parameters
+    theta = parameters.start(truth.elements)
+    cables = session.rig.cables
+    bounce = np.sqrt(len(cables) * stiffness / np.mean([c.length for c in cables]) / body)
+    true = {
+        "cable.axial_stiffness": stiffness,
+        "cable.axial_damping": 2.0 * ratio / bounce,
+        "liquid_slosh.mass": mass,
+        "liquid_slosh.damping_ratio": damping,
+    }
+    for p in (*stretch.parameters, *liquid.parameters):
+        if p.name in true:
+            theta[parameters.index_of(p.name)] = p.position(true[p.name])
+    rest = find_rest(model_at(parameters, theta), launch.rest).state
+    followed, outcomes, lost = predicted(wide, wide.runs, theta, rest)
+    assert len(followed) == 1
+    assert lost == ()
+    assert float(np.mean(outcomes[0].residual ** 2)) < 1.1

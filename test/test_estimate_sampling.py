@@ -10,11 +10,13 @@ from hypothesis.extra.numpy import arrays
 
 from rig_identification.estimate.sampling import (
     Grid,
+    Sampler,
     group_by_node,
     interpolation,
     jumps_of,
     node_input,
     node_values,
+    noise_felt,
     sample_noise_std,
     smoothed_input,
 )
@@ -126,6 +128,22 @@ def test_a_late_input_is_moved_by_all_of_it(late: float, piece: tuple[int, int])
     step = 1e-4
     slope = (moved.between(*piece).late_by(late + step)[0] - values) / step
     np.testing.assert_allclose(rate + 0.5 * step * bend, slope, atol=0.02)
+
+
+@pytest.mark.parametrize("rate", [200.0, 500.0])
+def test_the_noise_of_an_input_reaches_a_group_by_way_of_nodes(rate: float) -> None:
+    """What is claimed of it is what noise itself does."""
+    grid = Grid(0.01, 2001)
+    time = np.arange(0.0, 20.0, 1.0 / rate)
+    heard = np.arange(0.001, 19.99, 0.0025)
+    group, node = group_by_node(grid, heard)
+    sampler = Sampler(grid, heard, group, node.size)
+    noise = np.random.default_rng(3).normal(size=(time.size, 1))
+    groups = sampler.at(0.0)[0] @ node_input(grid, time, noise, 1.0).values
+    of_interval = 1.0 / np.sqrt(rate * grid.step)
+    found = noise_felt(grid, time, sampler, node.size)
+    assert found == pytest.approx(float(np.std(groups)) / of_interval, rel=0.05)
+    assert 0.5 < found < 1.0
 
 
 @pytest.mark.parametrize("std", [1e-4, 0.5, 20.0])

@@ -270,14 +270,16 @@ def noise_felt(grid: Grid, time: Array, sampler: Sampler, groups: int) -> float:
     In units of what a mean over one node interval brings. Nodes come from samples on both sides, and groups
     from nodes on both sides: less of the noise is left than the interval's own.
     """
-    every = max(1, round(APART * grid.step * time.size / max(float(time[-1] - time[0]), grid.step)))
+    rate = time.size / max(float(time[-1] - time[0]), grid.step)
+    # One more than a whole number of nodes: each of them is at another place between its nodes
+    every = round(APART * grid.step * rate) + 1
     chosen = np.arange(every // 2, time.size, every)
     impulses = np.zeros((time.size, 1))
     impulses[chosen] = 1.0
     weights, _ = sampler.at(0.0)
     heard = weights @ node_input(grid, time, impulses, np.inf).values
-    variance = float(np.sum(heard**2)) / chosen.size * time.size / groups
-    return float(np.sqrt(variance * grid.step * time.size / max(float(time[-1] - time[0]), grid.step)))
+    variance = float(np.sum(heard**2)) / max(1, chosen.size) * time.size / groups
+    return float(np.sqrt(variance * grid.step * rate))
 
 
 #: Frequencies over which a spectrum is averaged, Hz.

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 #: How far what swings or yields within the rig is from where it hangs when a run starts, in parts of how far
 #: the body may be, and the rate (1/s) of that: fractions of a second tell both from one another badly.
-INNER, INNER_RATE = 0.005, 10.0
+INNER, INNER_RATE = 0.0005, 10.0
 
 
 @dataclass(frozen=True)
