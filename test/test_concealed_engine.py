@@ -117,7 +117,7 @@ def test_newton_and_euler_hold_with_the_true_inertia(moving: tuple[Scene, Trajec
 
 
 def test_tensions_are_the_cables_own_beside_a_hose() -> None:
-    """A hose's tendon may come before theirs: in run 12813 of the nineteenth examination it was told as one."""
+    """A hose's tendon may come before theirs: in session 12813 it was read as one."""
     scene = released_aside(draw_scene(1, 4.0))
     rng = np.random.default_rng(5)
     hose, stretch = Tether.draw(rng, scene, 0.6), CableElasticity.draw(rng, scene, 0.5)

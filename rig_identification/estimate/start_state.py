@@ -83,8 +83,9 @@ def fit_start(
     """The run's own start state alone, everything else held: what a held-out run may be given.
 
     extra_noise (6, 6): see :func:`linearise_run`. spread: std of a prior on the start about
-    ``start`` (m, rad; twice as much m/s, rad/s; of what swings or yields within the rig INNER of it). polish: see :func:`solve`. doubted: std, in tolerances,
-    of what is believed of rig and devices (:class:`_Doubts`).
+    ``start`` (m, rad; twice as much m/s, rad/s; INNER of it for what swings or yields within the rig).
+    polish: see :func:`solve`. doubted: std, in tolerances, of what is believed of rig and devices
+    (:class:`_Doubts`).
     """
     p = bench.parameters.size
     model = model_at(bench.parameters, theta)

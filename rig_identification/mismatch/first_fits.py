@@ -223,7 +223,7 @@ def leading(
         chiefly = excess(first.evaluation) < ALMOST * left
         for k, promise in enumerate(worth_a_fit(promises, count_of(others))[:FURTHER]):
             if promise.candidate.build is not None:
-                # Fitted slowly, and to first order promises less than it keeps: the best, beside the chief one
+                # Fitted slowly, and promises less than it keeps: the best one, beside what is chief
                 if k > 0 or not chiefly or promise.share < CHIEF or budget.spent():
                     continue
             elif promise.share < DIRECT:

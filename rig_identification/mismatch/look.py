@@ -397,11 +397,11 @@ class Look:
         return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
 
     def _simpler(self, trial: Trial, known: set[str]) -> list[Trial]:
-        """Special cases of a trial that are worth telling beside it. known: labels of what is told already."""
+        """Special cases of a trial that are worth telling beside it. known: labels of what is told."""
         judged = set() if self.far else {t.candidate.label for t in self.tried}
         unknown = [c for c in self.candidates if c.label not in known | judged]
-        simpler = map(self._fair, fitted_simpler(self.here, trial, unknown))
-        simpler = (t for t in simpler if t.evidence > self.needed)
+        simpler = [self._fair(t) for t in fitted_simpler(self.here, trial, unknown)]
+        simpler = [t for t in simpler if t.evidence > self.needed]
         return [t for t in simpler if self.far or beyond_doubt(t, self.ordinary, self.limit)]
 
     def without_devices(self) -> None:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def _innovations(A, B, node, H, D, felt, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
     """out (m, c): normalised innovations of the responses to ``wrenches`` (N, 6, c).
 
-    felt (m, 6): response of each row to the filter's own noise. gains (m, X + 6), deviations (m,): the filter.
+    felt (m, 6): response of each row to the filter's own noise. gains (m, X + 6), deviations (m,): its own.
     """
     nodes, states, count = A.shape[0], A.shape[1], wrenches.shape[2]
     size = states + 6

@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 #: Directions of riders that are looked at more finely, best first.
 FINER = 2
-#: Share of a rider's best promise that another peak over its frequencies has to come to, to be fitted as well.
+#: Share of the best promise of an effect that another one of the same has to come to, to be fitted as well.
 ELSEWHERE = 0.8
 
 

@@ -81,9 +81,7 @@ def trials(
     led = None
     if more and not far:
         led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
-    look = Look(
-        problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, law
-    )
+    look = Look(problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, law)
     if led is not None and led.leads:
         return Trials(look.told([led.first]))
     if led is not None and here is problem:
