@@ -82,7 +82,7 @@ def test_a_tilt_is_not_taken_for_a_body_that_starts_elsewhere() -> None:
 
 
 def test_a_run_is_launched_with_a_liquid_on_cables_that_stretch() -> None:
-    """Tenths of a second tell a liquid half a metre aside badly from a body that starts a little elsewhere."""
+    """Tenths of a second hardly tell a liquid half a metre aside from a body that starts elsewhere."""
     stiffness, ratio, mass, frequency, damping, place = 2e7, 0.02, 4.0, 0.9, 0.03, (1.2, 1.1, -0.8)
     effects = {
         "cable_elasticity": (stiffness,),
