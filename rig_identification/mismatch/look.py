@@ -361,9 +361,21 @@ class Look:
             return None
         first, second = found
         others = compatible(self.candidates, [first.candidate])
-        seconds = [second, *fitted_simpler(first.problem, second, others)]
+        seconds = [
+            second,
+            *fitted_simpler(first.problem, second, others),
+            *self._ringing_beside(first, second),
+        ]
         self.beside[first.candidate.label] = sorted(seconds, key=lambda t: -t.evidence)
         return first
+
+    def _ringing_beside(self, first: Trial, second: Trial) -> list[Trial]:
+        """Ceilings that ring beside a first hypothesis as a part on springs does, and leave nothing."""
+        if gives_way(first.problem.bench.parameters.model):
+            return []
+        like = ringing_like(first.problem, [second], first.evaluation, self.mass)
+        ceilings = (leaving_nothing(first, promise, self.budget) for promise in like)
+        return [t for t in ceilings if t is not None]
 
     def finished(self, trial: Trial) -> Trial | None:
         """A trial fitted to its end, which takes its place among what was tried."""
