@@ -18,7 +18,7 @@ from rig_identification.estimate.growing import NEAR_SQUARE, held_over, misfit, 
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, shortened, solve
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
@@ -51,6 +51,8 @@ STEPS, LAST_STEPS = 8, 20
 FITTED = 2
 #: Std by which the strongest part of a law has to be seen: twice what one needs to stay.
 CERTAIN = 2.0 * SEEN
+#: s, to which the runs of a law's fit grow after the first horizons: straight to all its steps are lost.
+LONGER = (4.0, 8.0)
 
 
 def lawful(
@@ -171,6 +173,10 @@ def _fitted(
                     # What a law does not explain over a second it will not over two
                     return None
                 there = reached.point
+            for end in LONGER:
+                part = shortened(wide, end)
+                there = replace(there, starts=settled_starts(part, there))
+                there = _solved(part, there, STEPS, budget)[0].point
         there = replace(there, starts=settled_starts(wide, there))
         fitted, settled = _solved(wide, there, LAST_STEPS, budget)
     except FloatingPointError:
