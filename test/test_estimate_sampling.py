@@ -141,7 +141,7 @@ def test_the_noise_of_an_input_reaches_a_group_by_way_of_nodes(rate: float) -> N
     noise = np.random.default_rng(3).normal(size=(time.size, 1))
     groups = sampler.at(0.0)[0] @ node_input(grid, time, noise, 1.0).values
     of_interval = 1.0 / np.sqrt(rate * grid.step)
-    found = noise_felt(grid, time, sampler, node.size)
+    (found,) = noise_felt(grid, time, [sampler])
     assert found == pytest.approx(float(np.std(groups)) / of_interval, rel=0.05)
     assert 0.5 < found < 1.0
 

@@ -161,12 +161,6 @@ def _channel(
     return Channel(device, quantity, columns, unit, time, values, std, estimated, group, node)
 
 
-def _felt(grid: Grid, time: Array, channel: Channel) -> Channel:
-    """The channel, with what it feels of the noise of a force that is sampled at ``time``."""
-    sampler = Sampler(grid, channel.time, channel.group, channel.node.size)
-    return replace(channel, felt=noise_felt(grid, time, sampler, channel.node.size))
-
-
 def heard_apart(rig: Rig, part: Run) -> Run:
     """A stretch of a run with the noise of its own samples, where what it was cut from sounds louder."""
     channels = []
@@ -294,6 +288,8 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
         force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
         unknown = known.unknown
     channels = tuple(c for c in found if c is not None)
-    if force is not None:
-        channels = tuple(_felt(grid, known.time, c) for c in channels)
-    return Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
+    run = Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
+    if force is None:
+        return run
+    felt = noise_felt(grid, known.time, run.samplers)
+    return replace(run, channels=tuple(replace(c, felt=f) for c, f in zip(channels, felt, strict=True)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -264,11 +265,11 @@ def smoothed_input(grid: Grid, nodes: Array) -> SmoothInput:
 APART = 40
 
 
-def noise_felt(grid: Grid, time: Array, sampler: Sampler, groups: int) -> float:
-    """Standard deviation of the noise that an input's samples bring to a grouped sample at once.
+def noise_felt(grid: Grid, time: Array, samplers: Sequence[Sampler]) -> list[float]:
+    """Standard deviation of the noise that an input's samples bring to the grouped samples of each sampler.
 
-    In units of what a mean over one node interval brings. Nodes come from samples on both sides, and groups
-    from nodes on both sides: less of the noise is left than the interval's own.
+    At once, in units of what a mean over one node interval brings. Nodes come from samples on both sides,
+    and groups from nodes on both sides: less of the noise is left than the interval's own.
     """
     rate = time.size / max(float(time[-1] - time[0]), grid.step)
     # One more than a whole number of nodes: each of them is at another place between its nodes
@@ -276,10 +277,10 @@ def noise_felt(grid: Grid, time: Array, sampler: Sampler, groups: int) -> float:
     chosen = np.arange(every // 2, time.size, every)
     impulses = np.zeros((time.size, 1))
     impulses[chosen] = 1.0
-    weights, _ = sampler.at(0.0)
-    heard = weights @ node_input(grid, time, impulses, np.inf).values
-    variance = float(np.sum(heard**2)) / max(1, chosen.size) * time.size / groups
-    return float(np.sqrt(variance * grid.step * rate))
+    nodes = node_input(grid, time, impulses, np.inf).values
+    scale = time.size / max(1, chosen.size) * grid.step * rate
+    # The mean over all groups of what every sample brings to each
+    return [float(np.sqrt(scale * np.mean((sampler.at(0.0)[0] @ nodes) ** 2))) for sampler in samplers]
 
 
 #: Frequencies over which a spectrum is averaged, Hz.

@@ -173,7 +173,8 @@ def _fitted(
                     # What a law does not explain over a second it will not over two
                     return None
                 there = reached.point
-            for end in LONGER:
+            longest = max(run.grid.duration for run in wide.runs)
+            for end in (end for end in LONGER if end < longest):
                 part = shortened(wide, end)
                 there = replace(there, starts=settled_starts(part, there))
                 there = _solved(part, there, STEPS, budget)[0].point

@@ -46,14 +46,14 @@ def _innovations(A, B, node, H, D, felt, gains, deviations, wrenches, smooth, ou
             for c in range(count):
                 seen[c] /= deviations[row]
                 out[row, c] = seen[c]
-            for i in range(size):
+            for i in range(states):
                 g = gains[row, i]
                 if g != 0.0:
                     for c in range(count):
-                        if i < states:
-                            unseen[i, c] -= g * seen[c]
-                        else:
-                            taken[i - states, c] += g * seen[c]
+                        unseen[i, c] -= g * seen[c]
+            for i in range(6):
+                for c in range(count):
+                    taken[i, c] += gains[row, states + i] * seen[c]
             row += 1
         ahead = min(k + 1, nodes - 1) if smooth else k
         for i in range(6):

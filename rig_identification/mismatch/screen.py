@@ -256,14 +256,13 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
 def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     """The best swing of each direction, of effects that are not in the model already."""
     taken = {p.name for p in problem.bench.parameters.free}
-    found: dict[tuple[str, str], list[tuple[float, Promise]]] = {}
+    found: dict[tuple[str, str], list[Ridden]] = {}
     for ridden in scanned(problem, beyond, mass):
         effect = ridden.swing.effect
         # A second one of an effect would write its numbers over the first one's
         if f"{effect}.mass" not in taken:
-            promise = _ridden_promise(problem, beyond, ridden, mass)
-            found.setdefault((effect, ridden.swing.directions), []).append((ridden.swing.frequency, promise))
-    best = [_peaks(of_kind) for of_kind in found.values()]
+            found.setdefault((effect, ridden.swing.directions), []).append(ridden)
+    best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
     return [
         _with_elsewhere([_best_near(problem, beyond, peak, mass) for peak in peaks] if k < FINER else peaks)
@@ -271,16 +270,32 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     ]
 
 
-def _peaks(scan: list[tuple[float, Promise]]) -> list[Promise]:
-    """Of promises by frequency the best, and the best other peak that comes close to it.
+def _best_swings(problem: Problem, beyond: Beyond, swings: list[Ridden], mass: float) -> list[Promise]:
+    """Of one kind's swings, by frequency, the promises of the best and of the next peak (:func:`_peaks`)."""
+    gains = np.array([ridden.best.gain for ridden in swings])
+    promises: dict[int, Promise] = {}
+    most = 0.0
+    for k in np.argsort(-gains):
+        if most > 0.0 and gains[k] < ELSEWHERE * most:
+            # A motion accounts for no more than that
+            break
+        promises[int(k)] = _ridden_promise(problem, beyond, swings[k], mass)
+        most = max(most, promises[int(k)].gain)
+    for k, promise in promises.items():
+        gains[k] = promise.gain
+    return [promises[k] for k in _peaks(gains)]
+
+
+def _peaks(gains: Array) -> list[int]:
+    """Of promised gains, by frequency, where the best is, and the best other peak that comes close to it.
 
     One run shakes a liquid at few frequencies: a lighter one near one of them is alike to a heavier one near
     another to first order, and their fits differ by far (bench/concealed/sealed_run_19, 12853).
     """
-    gains = np.array([-np.inf, *(p.gain for _, p in scan), -np.inf])
-    high = np.flatnonzero((gains[1:-1] >= gains[:-2]) & (gains[1:-1] > gains[2:]))
-    peaks = sorted((scan[k][1] for k in high), key=lambda p: -p.gain)
-    return peaks[:1] + [p for p in peaks[1:2] if p.gain > ELSEWHERE * peaks[0].gain]
+    edged = np.array([-np.inf, *gains, -np.inf])
+    high = np.flatnonzero((edged[1:-1] >= edged[:-2]) & (edged[1:-1] > edged[2:]))
+    first, *others = sorted((int(k) for k in high), key=lambda k: -gains[k])
+    return [first, *(k for k in others[:1] if gains[k] > ELSEWHERE * gains[first])]
 
 
 def _best_near(problem: Problem, beyond: Beyond, peak: Promise, mass: float) -> Promise:
