@@ -25,7 +25,7 @@ class Candidate:
 
     effect: str  # word of the recording contract
     parameters: tuple[Parameter, ...]  # free beyond the ideal model: added, or with a wider prior
-    sentence: str  # with {value}, {std} and {where}
+    sentence: str  # with {value} of the first quantity, {told[name]} of any, and {channel}
     advice: str  # what to do about it
     where: dict[str, object] = field(default_factory=dict)
     positive: int = 0  # so many of the first parameters cannot be negative

@@ -43,15 +43,18 @@ def finding(
     """
     candidate = trial.candidate
     told = candidate.told(values, stds)
-    first = next(iter(told.values()))
-    shown = f"{first[0]:.4g} ± {first[1]:.2g}" + ("" if first[2] == "1" else f" {first[2]}")
+    shown = {
+        name: f"{value:.4g} ± {std:.2g}" + ("" if unit == "1" else f" {unit}")
+        for name, (value, std, unit) in told.items()
+    }
     where = dict(candidate.where)
     for place in (f"{candidate.effect}.point", f"{candidate.effect}.position"):
         if f"{place}.x" in values:
             where["position"] = [float(values[f"{place}.{a}"]) for a in "xyz"]
     if candidate.effect == "imu_misalignment":
         where["axis"] = max("xyz", key=lambda a: abs(told[f"angle_{a}"][0]))
-    sentence = candidate.sentence.format(value=shown, channel=where.get("channel"))
+    first = next(iter(shown.values()))
+    sentence = candidate.sentence.format(value=first, channel=where.get("channel"), told=shown)
     return Finding(
         candidate.effect,
         where,

@@ -9,11 +9,12 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit, settled_starts
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
 from rig_identification.estimate.segments import in_pieces
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.locate import DRIVE
+from rig_identification.mismatch.look import NEXT_TO_NONE
 from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -22,6 +23,8 @@ from rig_identification.mismatch.whole_runs import whole_runs
 from rig_identification.result import Finding, Mismatch
 
 Notify = Callable[[str, float], None]
+#: What is told, and the fit that something loose is looked for beside.
+_Base = tuple[tuple[Finding, ...], Fitted]
 
 #: Share of the excess that named effects must take away to be told where something is left.
 CONVINCING = 0.95
@@ -36,7 +39,8 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
     convincing = convincing and best is not None and misfit(best.fitted.evaluation) < WRONG
-    if convincing and best is not None and not hear(best.fitted).contradicted:
+    nearly_all = convincing and best is not None and _next_to_none(ideal, best)
+    if convincing and best is not None and (nearly_all or not hear(best.fitted).contradicted):
         kept: tuple[Finding, ...] = best.mismatch.findings
         fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
     else:
@@ -52,7 +56,9 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
             here, evaluation = pieces[0], pieces[1] or evaluation
     # What knocks at the body moves all witnesses: where all but one device agree, nothing does
     knocks = search.liar in (None, DRIVE)
-    loose = _something_loose(ideal, best, search, notify) if knocks else None
+    bases: list[_Base] = [] if nearly_all else [((), ideal.fitted)]
+    bases += [] if best is None else [(best.mismatch.findings, best.fitted)]
+    loose = _something_loose(bases, ideal.scores.holdout, search, notify) if knocks else None
     if loose is not None:
         kept, fitted = loose
         explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
@@ -66,21 +72,27 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, looseness)
 
 
+def _next_to_none(ideal: Ideal, best: Explained) -> bool:
+    """Whether names leave so little of whole runs that they stand in for nothing, held-out runs or not.
+
+    Dry hinges of which a part in a million is left are dry, whatever else a loose part does to the body.
+    """
+    return excess(best.fitted.evaluation) < NEXT_TO_NONE * excess(ideal.fitted.evaluation)
+
+
 def _something_loose(
-    ideal: Ideal, best: Explained | None, search: Search, notify: Notify
-) -> tuple[tuple[Finding, ...], Fitted] | None:
+    bases: list[_Base], before: float | None, search: Search, notify: Notify
+) -> _Base | None:
     """What is told, and the fit it is told beside, where the session has something loose; None: it has not.
 
-    It is looked for beside the ideal model, and then beside what was found, which may only stand in for it.
+    It is looked for beside the ideal model, unless what was found cannot stand in for it, and then beside
+    what was found. before: held-out error of the ideal model.
     """
-    bases: list[tuple[tuple[Finding, ...], Fitted]] = [((), ideal.fitted)]
-    if best is not None:
-        bases.append((best.mismatch.findings, best.fitted))
     for others, fitted in bases:
         if search.budget.late():
             break
         notify("search: something loose", 0.9)
-        found = loose_finding(fitted, ideal.scores.holdout)
+        found = loose_finding(fitted, before)
         if found is not None:
             return (*others, found), fitted
     return None

@@ -187,15 +187,18 @@ class Look:
         known = {t.candidate.label for t in self.tried} | self.hopeless
         return [p for p in promises if p.candidate.label not in known]
 
-    def directly(self) -> None:
-        """What screening promises.
+    def _worthy(self, promises: list[Promise]) -> list[Promise]:
+        """The promises worth a fit here.
 
-        Where the residuals as a whole show something, only what takes of it away: a hose that explains
-        twenty nats of four thousand is what it bends to, and its fit takes half a minute.
+        Where near the noise the residuals as a whole show something, only what takes of it away: a hose that
+        explains twenty nats of four thousand is what it bends to, and its fit takes half a minute.
         """
-        worthy = worth_a_fit(self.promises, self.count)
-        if not self.far and shows(self.seen):
-            worthy = [p for p in worthy if p.share > WORTH]
+        worthy = worth_a_fit(promises, self.count)
+        return worthy if self.far or not shows(self.seen) else [p for p in worthy if p.share > WORTH]
+
+    def directly(self) -> None:
+        """What screening promises."""
+        worthy = self._worthy(self.promises)
         if self.fitted is not None and all(p.candidate.label != self.fitted.candidate.label for p in worthy):
             # More than first order promised may have come of it
             worthy += [p for p in self.promises if p.candidate.label == self.fitted.candidate.label]
@@ -327,7 +330,7 @@ class Look:
         known: set[str] = set()
         for promise in likely(self.promises, again):
             label = promise.candidate.label
-            if self.budget.spent() or self.at_noise:
+            if self.budget.spent() or self.enough:
                 break
             if label in known or any(t.candidate.label == label and self._decided(t) for t in self.tried):
                 continue
@@ -461,7 +464,7 @@ class Look:
         """Near the noise: what gives way, of which first order says nothing where it rings."""
         self.notify("what gives way")
         worthy = self.untried(supports(self.here, self.seen, self.mass, self.budget))
-        self.begin(worth_a_fit(sorted(worthy, key=lambda p: -p.gain), self.count))
+        self.begin(self._worthy(sorted(worthy, key=lambda p: -p.gain)))
 
     def passed_over(self) -> bool:
         """Whether there is a number of the rig left to try, where nothing that was tried makes sense.
@@ -471,7 +474,7 @@ class Look:
         """
         rest = [p for p in self.untried(self.promises) if not p.candidate.slow]
         self.tried = []
-        self.begin(worth_a_fit(rest, self.count))
+        self.begin(self._worthy(rest))
         return bool(self.tried)
 
     def giving_way_beside(self) -> list[Trial]:

@@ -110,7 +110,11 @@ def named(
             # Something large is left: there is no use yet in whole runs
             continue
         notify("search: whole runs with " + ", ".join(t.candidate.label for t in search.found), at)
-        best = whole_runs(ideal, search)
+        latest = whole_runs(ideal, search)
+        if best is not None and _adds_nothing(latest, best):
+            search.back_to(before)
+            break
+        best = latest
         asked = law is not None and not step and not before.whole
         likelier = partial(lawful_instead, ideal, before, notify)
         if _wholly(best):
@@ -214,6 +218,13 @@ def _one_more(
             if _wholly(both):
                 return both
     return undecided_beside(best, promises, count_of(left), notify, search.budget)
+
+
+def _adds_nothing(latest: Explained, before: Explained) -> bool:
+    """Whether one more effect leaves far from the noise most of what was left ``before`` it."""
+    if latest.mismatch.verdict == "explained" or near_noise(latest.fitted):
+        return False
+    return excess(latest.fitted.evaluation) > CHIEF * excess(before.fitted.evaluation)
 
 
 def _wholly(found: Explained) -> bool:

@@ -4,6 +4,7 @@ Near the noise first order can be trusted, and of two effects at once the likeli
 often a third one: nine numbers of a hose bend to a heavy cable beside a cell's zero, of two numbers. So pairs
 are screened as single ones are. A pair costs what noise gives both of them; where it is worth more than any
 single hypothesis even so, and its fit keeps that, the search begins with the one that says more alone.
+Where a single one that is fitted slowly promised most, it is fitted as well, and evidence decides.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ class Led:
 
     first: Trial
     leads: bool  # whether the fit of both keeps what the pair promised
+    instead: Trial | None = None  # one effect that is as likely as both
 
 
 def first_of_two(
@@ -48,7 +50,8 @@ def first_of_two(
     promises: of all hypotheses about ``evaluation``, best first; count: of all hypotheses. ahead: nats by
     which a pair has to be worth more. limit: of ordinary errors, in tolerances.
     """
-    alone = max((p.gain - needed_gain(p.candidate, count) for p in promises), default=0.0)
+    single = max(promises, key=lambda p: p.gain - needed_gain(p.candidate, count), default=None)
+    alone = 0.0 if single is None else single.gain - needed_gain(single.candidate, count)
     likely = {p.candidate.label: p for p in promises if not p.candidate.slow and p.candidate.settle is None}
     plain = list(likely.values())[:PAIRED]
     pairs = [
@@ -77,7 +80,15 @@ def first_of_two(
     # What the first took away by itself, further along than first order saw, needs no other one
     kept = kept and first.evaluation.cost - second.evaluation.cost > needed_gain(other, count)
     meant = all(beyond_doubt(replace(second, candidate=c), ordinary, limit) for c in (one, other))
-    return Led(first, kept and meant)
+    if not (kept and meant):
+        return Led(first, False)
+    slow = None
+    if single is not None and single.candidate.slow and alone > 0.0 and not budget.spent():
+        notify(single.candidate.label)
+        begun = attempt(problem, evaluation, single, budget)
+        slow = None if begun is None else finished(begun, budget)
+    instead = slow is not None and slow.evidence > second.evidence - ahead
+    return Led(first, not instead, slow if instead else None)
 
 
 def _cost(pair: tuple[Candidate, Candidate], count: int) -> float:

@@ -85,7 +85,7 @@ def trials(
     if led is not None and led.leads:
         return Trials(look.told([led.first]))
     if led is not None and here is problem:
-        look.fitted = led.first
+        look.fitted = led.instead or led.first
     lead = None
     if misfit(seen) > VERY_FAR:
         look.outright()

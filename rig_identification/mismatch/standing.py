@@ -45,6 +45,11 @@ class Search:
         """The same search, to go on with by itself."""
         return replace(self, found=list(self.found), rivals=list(self.rivals))
 
+    def back_to(self, before: Search) -> None:
+        """Go back to where it stood; what it has come to since stays said as a rival."""
+        self.found, self.bodies = list(before.found), before.bodies
+        self.here, self.evaluation, self.share = before.here, before.evaluation, before.share
+
     def adopt(self, tried: Trials, chosen: Trial, *, in_passing: bool = False) -> None:
         """Go on with ``chosen`` in the model; other likely ones not refuted before it are its rivals.
 

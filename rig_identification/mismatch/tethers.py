@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
@@ -52,7 +53,7 @@ REACH = 0.6
 HOSE, HOSE_SPREAD = 1.5, 0.7
 #: Std by which a pull has to be more than what comes off it for a hose to be certainly taut all the time.
 CERTAIN = 3.0
-#: Gain (nats) of a tether's stiffness beyond its pull: what pulls steadily alone is no tether.
+#: Gain (nats) of a tether's stiffness beyond its pull, below which it pulls steadily as far as can be seen.
 STIFF = 3.0
 
 
@@ -114,7 +115,9 @@ def _tether(axes: str, rig: Rig, mass: float) -> Candidate:
     show by itself, and enough to stand for a centre of mass that lies millimetres higher.
     """
     parts = _amounts(axes, rig, mass)
+    so = "a stiffness of {value}"
     if len(axes) == 1:
+        so = "{told[preload]} at rest and a stiffness of {value}"
         entry = layout.effects_offset(len(rig.cables)) + place.TETHER_STIFFNESS
         first, second = (entry + i for i, a in enumerate(AXES) if a != axes)
         aside = added("tether.sideways", "N/m", PULL * mass * rig.gravity / SHORT_HOSE, first)
@@ -122,7 +125,7 @@ def _tether(axes: str, rig: Rig, mass: float) -> Candidate:
     return Candidate(
         "tether",
         (*parts, *_point(rig)),
-        "A hose or wire pulls on the body with a stiffness of {value}.",
+        f"A hose or wire pulls on the body with {so}.",
         ADVICE,
         {"channel": None, "axis": axes if len(axes) == 1 else None},
         positive=len(axes),
@@ -139,8 +142,8 @@ def _hose(axis: str, side: float, rig: Rig, mass: float) -> Candidate:
     return Candidate(
         "tether",
         (stiffness, pull, reach, *_point(rig)),
-        "A taut hose or wire pulls on the body with a stiffness of {value}; it only pulls, and hangs free "
-        "where the body swings far towards its other end.",
+        "A taut hose or wire pulls on the body with {told[preload]} at rest and a stiffness of {value}; it "
+        "only pulls, and hangs free where the body swings far towards its other end.",
         ADVICE,
         {"channel": None, "axis": axis},
         positive=1,
@@ -186,8 +189,10 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
 
 def placed_tethers(
     wide: Problem, evaluation: Evaluation, beyond: Beyond, candidates: Sequence[Candidate]
-) -> list[tuple[Candidate, float, dict[str, float]]]:
-    """Each tether at the place at which it promises most: candidate, gain (nats) and values.
+) -> list[tuple[Candidate, float, dict[str, float], bool]]:
+    """Each tether where it promises most: candidate, gain (nats), values, whether it is steady.
+
+    Steady is what promises no more than a pull: near the noise a hose along one axis may be that.
 
     wide: the problem of ``evaluation`` with the tethers' parameters free, none of them in its model so far.
     """
@@ -212,7 +217,8 @@ def placed_tethers(
     found = beyond.of(runs, rests)
     matrix = found.information((*runs, *rests)).reshape(len(names), TERMS, len(names), TERMS)
     right = found.right.reshape(len(names), TERMS)
-    out: list[tuple[Candidate, float, dict[str, float]]] = []
+    near = misfit(evaluation) < NEAR_SQUARE
+    out: list[tuple[Candidate, float, dict[str, float], bool]] = []
     for candidate in chosen:
         own = [q for q in candidate.parameters if not q.name.startswith("tether.point.")]
         mixed = _mixing(own, [free[name][1] for name in names])
@@ -224,10 +230,11 @@ def placed_tethers(
             1.0,
             REACH,
         )
-        if best is None or best.positive < STIFF:
-            out.append((candidate, 0.0, {}))
+        steady = best is not None and best.positive < STIFF
+        if best is None or (steady and (not near or candidate.positive > 1)):
+            out.append((candidate, 0.0, {}, False))
         else:
-            out.append((candidate, best.gain, _values(own, [q for _, q in points], best)))
+            out.append((candidate, best.gain, _values(own, [q for _, q in points], best), steady))
     return out
 
 
