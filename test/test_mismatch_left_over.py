@@ -1,0 +1,69 @@
+"""What is told where something is left: names beside which next to nothing is, and no effect too many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from test_mismatch_whole_rivals import fit_of, ideal_of, search_in, whole_with
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.identify import Ideal, near_noise
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.left_over import _next_to_none
+from rig_identification.mismatch.look import Trials
+from rig_identification.mismatch.named import _adds_nothing
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial
+from rig_identification.mismatch.whole_runs import whole_runs
+
+#: N m s/rad in every hinge: so much that next to nothing is left of a swing after ten seconds.
+DAMPING = 30.0
+
+
+@pytest.fixture(scope="module")
+def damped() -> tuple[Ideal, Search]:
+    ideal = ideal_of(shaken(10, 10.0), {"hinge_damping": (DAMPING,)}, 5)
+    return ideal, search_in(ideal)
+
+
+@pytest.fixture(scope="module")
+def aired(damped: tuple[Ideal, Search]) -> tuple[Trial, Explained]:
+    """Air, which takes a part of it away, in whole runs."""
+    ideal, search = damped
+    trial = fit_of(search, "air_drag")
+    return trial, whole_with(ideal, search, trial)
+
+
+def _beside(search: Search, first: Trial, label: str) -> Trial:
+    """One more hypothesis beside a first one."""
+    own = replace(search, problem=first.problem, evaluation=first.evaluation)
+    return fit_of(own, label)
+
+
+def test_names_that_leave_next_to_nothing_are_told_from_those_that_stand_in(
+    damped: tuple[Ideal, Search], aired: tuple[Trial, Explained]
+) -> None:
+    ideal, search = damped
+    assert not near_noise(ideal.fitted)
+    assert _next_to_none(ideal, whole_with(ideal, search, fit_of(search, "hinge_damping")))
+    assert not _next_to_none(ideal, aired[1])
+
+
+@pytest.mark.parametrize(("label", "nothing"), [("exciter_gain exciter", True), ("hinge_damping", False)])
+def test_one_more_that_leaves_most_of_what_was_left_is_not_kept(
+    damped: tuple[Ideal, Search], aired: tuple[Trial, Explained], label: str, nothing: bool
+) -> None:
+    ideal, search = damped
+    air, alone = aired
+    assert alone.mismatch.verdict == "unexplained"
+    begun = search.forked()
+    begun.adopt(Trials([air]), air)
+    before = begun.forked()
+    other = _beside(search, air, label)
+    begun.adopt(Trials([other]), other)
+    both = whole_runs(ideal, begun)
+    assert _adds_nothing(both, alone) is nothing
+    begun.back_to(before)
+    assert [t.candidate.label for t in begun.found] == ["air_drag"]
+    assert begun.evaluation is before.evaluation
