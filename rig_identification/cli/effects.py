@@ -40,8 +40,8 @@ def effect_of(name: str) -> str:
     """The contract's effect that a switch, or a device's error, belongs to."""
     first, _, rest = name.partition(".")
     kind = rest.partition(".")[0]
-    if {"feels", "drift", "load_cell_curve"} & set(rest.split(".")):
-        # A law of a reading, which the contract's table has no word for
+    if first == "cable_torsion" or {"feels", "drift", "load_cell_curve"} & set(rest.split(".")):
+        # What the contract's table has no word for: a law of a reading, ropes that twist
         return "unknown"
     if kind == "orientation":
         return "imu_misalignment" if first == "imu" else "inclinometer_offset"

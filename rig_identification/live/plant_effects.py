@@ -80,6 +80,7 @@ class PlantEffects:
     air_added_mass: float = 0.0  # kg
     exciter_rotor: float = 0.0  # kg
     cable_mass: float = 0.0  # kg/m
+    cable_torsion: float = 0.0  # N m/rad, each cable
     axial_stiffness: float = 0.0  # N, EA of the cables; 0: inextensible
     axial_damping_ratio: float = 0.0  # of the body's bounce on its cables
     tether: Array = field(default_factory=lambda: np.zeros(3))  # N/m, world axes
@@ -118,6 +119,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.ADDED_MASS] = effects.air_added_mass
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
     physics[block + place.LINEAR_DENSITY] += effects.cable_mass
+    physics[block + place.TORSION] = effects.cable_torsion
     rest = _rest(elastic.with_physics(physics))
     physics = elastic.with_physics(physics).referred(rest).physics
     physics[block + place.TETHER_STIFFNESS : block + place.TETHER_STIFFNESS + 3] = effects.tether

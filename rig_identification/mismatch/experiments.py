@@ -44,6 +44,7 @@ _EXPERIMENTS = {
     "tether": "take off one hose and wire after the other and repeat",
     "external_force": "repeat the run: a push does not come again at the same instant",
     "unknown": "repeat at another amplitude, and at two frequencies",
+    "unknown torsion of the cables": "repeat with the body turned slowly, and with swivels in the cables",
     "unknown curvature": "load that cell alone, with several known weights over its range",
     "unknown cross-sensitivity": "load one cell, or turn and tilt about one axis, alone: no other reads it",
     "unknown drift": "leave all at rest for as long as a recording takes: what drifts does so by itself",

@@ -67,8 +67,13 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
+    looseness = 1.0
+    if fitted is not ideal.fitted:
+        # With what is told in the model the body comes from whole runs, as loosely as these disagree
+        ideal, looseness = replace(ideal, careful=None), hear(fitted).looseness
+    elif near_noise(fitted):
+        looseness = hear(fitted).looseness
     # Far from the noise the cautious fit knows by itself how little it knows
-    looseness = hear(ideal.fitted).looseness if near_noise(ideal.fitted) else 1.0
     return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, looseness)
 
 

@@ -8,6 +8,7 @@ from rig_identification.model.effects.air_added_mass import add_air_added_mass
 from rig_identification.model.effects.air_drag import add_air_drag
 from rig_identification.model.effects.air_plates import add_air_plates
 from rig_identification.model.effects.cable_mass import add_cable_mass
+from rig_identification.model.effects.cable_torsion import add_cable_torsion
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.gyroscopic_share import add_gyroscopic_share
 from rig_identification.model.effects.hinge_bending import add_hinge_bending
@@ -27,6 +28,7 @@ from rig_identification.model.effects.place import (
     ROLL_STIFFNESS,
     ROTOR_MASS,
     TETHER_POINT,
+    TORSION,
     active,
 )
 from rig_identification.model.effects.point_law import add_point_law
@@ -47,6 +49,7 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
     hinges = hinges or active(physics[block + BENDING]) or active(physics[block + ROLL_STIFFNESS])
+    hinges = hinges or active(physics[block + TORSION])
     return body, rotor or rods or internal > 0, rotor, rods or hinges
 
 
@@ -72,6 +75,7 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     add_hinge_friction(physics, block, modes, x, R, r)
     add_hinge_bending(physics, block, modes, x, R, r)
     add_hinge_roll(physics, block, modes, x, R, r)
+    add_cable_torsion(physics, block, modes, x, R, r)
     add_air_drag(physics, block, x, R, r)
     add_air_plates(physics, block, x, R, r)
     add_turning_cube(physics, block, R, r)

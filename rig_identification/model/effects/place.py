@@ -25,19 +25,20 @@ TETHER_STIFFNESS = 12  # 3: N/m, world axes
 TETHER_PULL = 15  # 3: N, world axes
 LAW_SPRING = 18  # 3: N/m, N/m^2, N/m^3
 LAW_BRAKE = 21  # 2: N s/m, N s^2/m^2
-TETHER_POINT = 23  # 3: m, body
-REFERENCE_POSITION = 26  # 3: m, world
-REFERENCE_ROTATION = 29  # 9: rotation matrix, row by row
-ROLL_AXIS = 38  # 3: unit vector in body, a constant of the session like the reference pose
-ROLL_SKEW = 41  # tangent of the angle about the vertical between ROLL_AXIS and the axis that hinges hold
-PLATE_REACH = 42  # m, a constant of the session
-SHARING = 43  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-CREEP = 44  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
-TETHER_REACH = 45  # 3: m, world: from the body's point at rest to the wall; all 0: a spring on each axis
-LAW_POINT = 48  # 3: m, body
-LAW_DIRECTION = 51  # 2: rad, azimuth and elevation of the spring's line in the world
-LAW_NARROW = 53  # 1/m^2: how fast the brake fades away from where its point hangs at rest
-EFFECTS_SIZE = 54
+TORSION = 23  # N m/rad, each cable
+TETHER_POINT = 24  # 3: m, body
+REFERENCE_POSITION = 27  # 3: m, world
+REFERENCE_ROTATION = 30  # 9: rotation matrix, row by row
+ROLL_AXIS = 39  # 3: unit vector in body, a constant of the session like the reference pose
+ROLL_SKEW = 42  # tangent of the angle about the vertical between ROLL_AXIS and the axis that hinges hold
+PLATE_REACH = 43  # m, a constant of the session
+SHARING = 44  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+CREEP = 45  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
+TETHER_REACH = 46  # 3: m, world: from the body's point at rest to the wall; all 0: a spring on each axis
+LAW_POINT = 49  # 3: m, body
+LAW_DIRECTION = 52  # 2: rad, azimuth and elevation of the spring's line in the world
+LAW_NARROW = 54  # 1/m^2: how fast the brake fades away from where its point hangs at rest
+EFFECTS_SIZE = 55
 
 
 def effects_block(cables: int) -> int:
