@@ -8,11 +8,14 @@ import pytest
 from test_mismatch_whole_rivals import fit_of, ideal_of, search_in, whole_with
 from test_simulate_identify import shaken
 
-from rig_identification.estimate.identify import Ideal, near_noise
+from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
+from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.left_over import _next_to_none
-from rig_identification.mismatch.look import Trials
+from rig_identification.mismatch.look import Look, Trials
 from rig_identification.mismatch.named import _adds_nothing
+from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial
 from rig_identification.mismatch.whole_runs import whole_runs
@@ -48,6 +51,33 @@ def test_names_that_leave_next_to_nothing_are_told_from_those_that_stand_in(
     assert not near_noise(ideal.fitted)
     assert _next_to_none(ideal, whole_with(ideal, search, fit_of(search, "hinge_damping")))
     assert not _next_to_none(ideal, aired[1])
+
+
+def test_near_the_noise_what_takes_a_hundredth_of_what_shows_is_not_fitted(
+    damped: tuple[Ideal, Search],
+) -> None:
+    _, search = damped
+    candidates = catalogue(search.problem)
+    promises = [
+        Promise(next(c for c in candidates if c.effect == effect), 1e3, {}, share)
+        for effect, share in (("air_drag", 0.1), ("cable_mass", 0.01))
+    ]
+    look = Look(
+        search.problem,
+        search.evaluation,
+        search.problem,
+        search.evaluation,
+        candidates,
+        promises,
+        1e3,
+        ORDINARY,
+        False,
+        lambda label: None,
+        UNLIMITED,
+        None,
+    )
+    assert look._worthy(promises) == promises[:1]
+    assert replace(look, far=True)._worthy(promises) == promises
 
 
 @pytest.mark.parametrize(("label", "nothing"), [("exciter_gain exciter", True), ("hinge_damping", False)])
