@@ -12,7 +12,7 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import ORDINARY, fit_ideal
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.look import Trials
+from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.search import trials
 from rig_identification.mismatch.standing import short_pieces
 from rig_identification.mismatch.trial import VERY_FAR

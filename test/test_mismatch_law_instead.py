@@ -12,7 +12,7 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.identify import Ideal
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.lawful import lawful_instead
-from rig_identification.mismatch.look import MEANT
+from rig_identification.mismatch.outcome import MEANT
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial
 

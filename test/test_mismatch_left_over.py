@@ -13,8 +13,9 @@ from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.left_over import _next_to_none
-from rig_identification.mismatch.look import Look, Trials
+from rig_identification.mismatch.look import Look
 from rig_identification.mismatch.named import _adds_nothing
+from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial

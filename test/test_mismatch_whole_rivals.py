@@ -14,7 +14,7 @@ from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import FITTED, catalogue, count_of, needed_gain, worth_a_fit
-from rig_identification.mismatch.look import Trials
+from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, among_places, attempt, finished, mass_of

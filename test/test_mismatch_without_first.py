@@ -7,7 +7,7 @@ from test_mismatch_whole_rivals import fit_of, ideal_of, search_in
 from test_simulate_identify import shaken
 
 from rig_identification.mismatch.hypotheses import catalogue, count_of
-from rig_identification.mismatch.look import Trials
+from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import promises_of
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, attempt, finished

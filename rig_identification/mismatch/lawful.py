@@ -24,8 +24,8 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import AT_NOISE, BEATEN
-from rig_identification.mismatch.look import MEANT, Law, Trials
 from rig_identification.mismatch.measured import fitting_wrench
+from rig_identification.mismatch.outcome import MEANT, Law, Trials
 from rig_identification.mismatch.point_laws import (
     SEEN,
     law_finding,

@@ -1,11 +1,10 @@
 """One look for what explains most of what is left: the witnesses that are asked, and what came of it.
 
-Which is asked after which search.py says.
+Which is asked after which search.py says, and what is told of it telling.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -19,7 +18,6 @@ from rig_identification.estimate.solve import (
     evaluate,
     excess,
     solve,
-    still_promised,
 )
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
 from rig_identification.mismatch.at_rest import AtRest, at_rest, both_at_rest, from_rest
@@ -30,7 +28,6 @@ from rig_identification.mismatch.first_fits import (
     BEATEN,
     CLOSE,
     DIRECT,
-    RIVAL,
     Notify,
     almost,
     at_noise,
@@ -40,31 +37,20 @@ from rig_identification.mismatch.first_fits import (
     shows,
 )
 from rig_identification.mismatch.hypotheses import as_likely, compatible, count_of, worth_a_fit
-from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.locate import find_liar
-from rig_identification.mismatch.same_clock import contradicted
+from rig_identification.mismatch.outcome import MEANT, Law
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.simpler import fitted_simpler
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
     FIRST_STEPS,
     Trial,
-    among_places,
-    amount_seen,
-    as_it_stands,
-    attempt,
-    beyond_doubt,
-    earned_evidence,
     finished,
     fitted_from,
     log_evidence,
     ordinary_errors,
 )
 from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, unbent
-
-#: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
-#: than so much and whole runs do not refute it.
-Law = Callable[[Problem, Evaluation, float], Explained | None]
 
 #: Hypotheses that get to their end.
 FINISHED = 3
@@ -73,23 +59,6 @@ FINISHED = 3
 NEXT_TO_NONE = 1e-3
 #: What gives way or swings that is tried before changes of numbers which promise less.
 AT_ONCE = 3
-#: Log evidence that an effect has to gain.
-MEANT = 3.0
-
-
-@dataclass(frozen=True)
-class Trials:
-    """Hypotheses fitted in full, most likely first, and the device that contradicts all others."""
-
-    done: list[Trial]
-    liar: str | None = None
-    beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
-    lawful: Explained | None = None  # what explains the session instead
-    led: bool = False  # the first leads to another one, with which nothing is left
-    chief: bool = True  # whether the first takes the larger part of what was left away
-    beside: tuple[Trial, ...] = ()  # what it leads to, likeliest first, where that is fitted already
-    asked: bool = False  # whether rivals of that were asked as well
-    left: float = 0.0  # nats, without any of them
 
 
 @dataclass
@@ -147,7 +116,7 @@ class Look:
     @property
     def enough(self) -> bool:
         """Whether anything that was tried leaves only noise, or next to nothing of what was left."""
-        return any(self._enough(t) for t in self.tried)
+        return any(self.enough_with(t) for t in self.tried)
 
     @property
     def almost(self) -> bool:
@@ -172,7 +141,8 @@ class Look:
             return there
         return max(there, excess(fitted)) if fitted.cost < self.seen.cost else there
 
-    def _enough(self, trial: Trial) -> bool:
+    def enough_with(self, trial: Trial) -> bool:
+        """Whether a trial leaves only noise, or next to nothing of what was left."""
         return at_noise(trial) or excess(trial.evaluation) < NEXT_TO_NONE * excess(self.seen)
 
     def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
@@ -387,38 +357,6 @@ class Look:
             self.tried = [ended if t is trial else t for t in self.tried]
         return ended
 
-    def told(self, done: list[Trial]) -> list[Trial]:
-        """Trials, likeliest first, with special cases of each, and the lag beside every late clock.
-
-        A clock that leaves only noise keeps its lag from being tried, and with one more effect it may leave
-        as little as the lag by itself. A clock that its stamps contradict is told only where nothing else
-        is about as likely.
-        """
-        out = list(done)
-        for clock in done:
-            lag = lag_like(clock, self.candidates)
-            if lag is None or any(t.candidate.label == lag.candidate.label for t in out):
-                continue
-            self.notify(lag.candidate.label)
-            begun = attempt(self.here, self.seen, lag, self.budget)
-            twin = None if begun is None else finished(begun, self.budget)
-            if twin is not None and twin.evidence > self.needed:
-                out.append(twin)
-        for trial in done:
-            out += self._simpler(trial, {t.candidate.label for t in out})
-        heard = [(t, contradicted(t)) for t in out]
-        likely = max((t.evidence for t, impossible in heard if not impossible), default=-np.inf)
-        out = [t for t, impossible in heard if not impossible or t.evidence - likely > BEATEN]
-        return told_apart(sorted(map(among_places, out), key=lambda t: -t.evidence), MEANT)
-
-    def _simpler(self, trial: Trial, known: set[str]) -> list[Trial]:
-        """Special cases of a trial that are worth telling beside it. known: labels of what is told."""
-        judged = set() if self.far else {t.candidate.label for t in self.tried}
-        unknown = [c for c in self.candidates if c.label not in known | judged]
-        simpler = [self._fair(t) for t in fitted_simpler(self.here, trial, unknown)]
-        simpler = [t for t in simpler if t.evidence > self.needed]
-        return [t for t in simpler if self.far or beyond_doubt(t, self.ordinary, self.limit)]
-
     def without_devices(self) -> None:
         """What is wrong with the device that contradicts all others, if one does."""
         if self.problem.bench.parameters.model.internal > 0:
@@ -506,90 +444,9 @@ class Look:
                 self.beside[label] = [second]
         return sorted(out.values(), key=lambda t: -t.evidence)
 
-    def leads(self, done: list[Trial], *, asked: bool = False) -> Trials:
-        """Trials of which the first leads to another one, with which nothing is left.
-
-        asked: whether rivals of that other one were asked as well.
-        """
-        told = self.told(done)
-        beside = self.beside.get(told[0].candidate.label, ())
-        return Trials(told, led=True, beside=tuple(beside), asked=asked, left=self.left)
-
     def _lawfully(self) -> bool:
         """Whether a law explains it all."""
         if self.law is not None:
             self.notify("a force that follows one point's motion")
             self.lawful = self.law(self.here, self.seen, self.needed)
         return self.lawful is not None
-
-    def _fair(self, trial: Trial) -> Trial:
-        """Near the noise: less what the trial only gains from the noise."""
-        evidence = earned_evidence(self.here, self.seen, trial.evaluation, far=self.far)
-        return replace(trial, evidence=evidence)
-
-    def _missed(self, trial: Trial) -> bool:
-        """Whether more is left without a trial, about where it ends: a change of numbers alone.
-
-        Far along a curved valley an amount's std says little of how clear of none it lies.
-        """
-        if trial.candidate.build is not None:
-            return False
-        point = carried(self.here, trial.problem, trial.evaluation.point)
-        try:
-            without, _ = solve(self.here, point, iterations=FIRST_STEPS, tolerance=0.5)
-        except FloatingPointError:
-            return False
-        return trial.evidence > log_evidence(without) + MEANT
-
-    def _rivals(self, trial: Trial, best: Trial) -> bool:
-        """Whether a trial may yet come near the noise, as ``best`` does."""
-        left = excess(trial.evaluation)
-        return trial.candidate.label != best.candidate.label and left < CHIEF * excess(self.seen)
-
-    def ended(self) -> Trials:
-        """The likeliest of what was tried, fitted to its end."""
-        if not self.tried:
-            return Trials([], self.device)
-        tried = sorted((self._fair(t) for t in self.tried), key=lambda t: -t.evidence)
-        done: list[Trial] = []
-        beaten: list[Trial] = []
-        for trial in tried:
-            last = any(self._enough(t) for t in done) and _beaten(trial, done, tried[0], self.far)
-            if len(done) == FINISHED or ((last or (done and self.budget.spent())) and not trial.settled):
-                continue
-            self.notify(trial.candidate.label)
-            # Where nothing comes near it whole runs take it to its end
-            lone = self.far and at_noise(trial) and trial.candidate.closer is None
-            lone = lone and not any(self._rivals(t, trial) for t in self.tried)
-            # What is beaten is stated as it is: a closer description of it takes half a minute
-            plain = replace(trial, candidate=replace(trial.candidate, closer=None)) if last else trial
-            ended = as_it_stands(plain) if lone else finished(plain, self.budget)
-            if ended is None or not beyond_doubt(ended, self.ordinary, self.limit):
-                continue
-            if not self.far and not amount_seen(ended) and not self._missed(ended):
-                # It explains something, with an amount that may as well be none: it stands in for another
-                continue
-            ended = self._fair(ended)
-            if ended.evidence > self.needed:
-                _place(ended, beaten if last else done)
-        told = self.told(done)
-        chief = bool(told) and excess(told[0].evaluation) < CHIEF * self.left
-        return Trials(told, self.device, tuple(map(among_places, beaten)), chief=chief, left=self.left)
-
-
-def _place(trial: Trial, among: list[Trial]) -> None:
-    """Add a trial; of two descriptions that have the same closer one the likelier."""
-    same = next((t for t in among if t.candidate.label == trial.candidate.label), None)
-    if same is None:
-        among.append(trial)
-    elif trial.evidence > same.evidence:
-        among[among.index(same)] = trial
-
-
-def _beaten(trial: Trial, done: list[Trial], first: Trial, far: bool) -> bool:
-    """Whether a hypothesis is no rival of those that reached the noise, by its first steps."""
-    if far:
-        return excess(trial.evaluation) > RIVAL * excess(first.evaluation)
-    # A curved valley takes more steps than the first ones
-    ahead = 0.0 if trial.settled else still_promised(trial.problem, trial.evaluation)
-    return trial.evidence + ahead < max(t.evidence for t in done) - BEATEN

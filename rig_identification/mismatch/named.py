@@ -16,7 +16,7 @@ from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import AT_NOISE, at_noise
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain, worth_a_fit
 from rig_identification.mismatch.lawful import lawful_instead
-from rig_identification.mismatch.look import Law, Trials
+from rig_identification.mismatch.outcome import Law, Trials
 from rig_identification.mismatch.push import push_too
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import MOST_EFFECTS, trials

@@ -20,10 +20,12 @@ from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.first_fits import DIRECT, Notify, at_noise, shows
 from rig_identification.mismatch.hypotheses import count_of
-from rig_identification.mismatch.look import MEANT, Law, Look, Trials
+from rig_identification.mismatch.look import Look
+from rig_identification.mismatch.outcome import MEANT, Law, Trials
 from rig_identification.mismatch.pairs import first_of_two
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
+from rig_identification.mismatch.telling import ended, leads, told_of
 from rig_identification.mismatch.trial import VERY_FAR, Trial, mass_of
 
 #: Effects looked for at most.
@@ -83,7 +85,7 @@ def trials(
         led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
     look = Look(problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, law)
     if led is not None and led.leads:
-        return Trials(look.told([led.first]))
+        return Trials(told_of(look, [led.first]))
     if led is not None and here is problem:
         look.fitted = led.instead or led.first
     lead = None
@@ -94,7 +96,7 @@ def trials(
         if lead is None and not look.enough:
             look.at_rest()
             if more and look.certain:
-                return look.leads(look.certain, asked=True)
+                return leads(look, look.certain, asked=True)
             if look.moving:
                 look.giving_way_at_once()
                 lead = look.leading() if more and look.almost else None
@@ -106,11 +108,11 @@ def trials(
         look.directly()
         lead = look.leading() if more else None
     if lead is not None:
-        return look.leads([lead])
+        return leads(look, [lead])
     if more and far and not look.enough:
         ahead = look.giving_way_beside()
         if ahead:
-            return look.leads(ahead, asked=True)
+            return leads(look, ahead, asked=True)
     if far and not look.enough:
         look.without_devices()
     if far and not look.enough:
@@ -121,10 +123,10 @@ def trials(
         look.yielding_a_little()
     elif not gives_way(problem.bench.parameters.model):
         look.ringing()
-    found = look.ended()
+    found = ended(look)
     if found.done or far or not more or not look.passed_over():
         return found
-    return look.ended()
+    return ended(look)
 
 
 def _without_support(tried: list[Trial], before: Evaluation) -> bool:

@@ -10,7 +10,7 @@ from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.findings import rival
-from rig_identification.mismatch.look import Trials
+from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.trial import Trial, adopted
 

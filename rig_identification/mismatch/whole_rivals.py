@@ -21,7 +21,7 @@ from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import BEATEN, at_noise
 from rig_identification.mismatch.in_motion import cost_in_motion
 from rig_identification.mismatch.late import SETTLING, twins
-from rig_identification.mismatch.look import MEANT, Trials
+from rig_identification.mismatch.outcome import MEANT, Trials
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, among_places, earned_evidence
 from rig_identification.mismatch.whole_runs import as_fitted, whole_runs

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from rig_identification.estimate.solve import POLISH, solve
 from rig_identification.mismatch.first_fits import BEATEN, at_noise
-from rig_identification.mismatch.look import MEANT, Trials
+from rig_identification.mismatch.outcome import MEANT, Trials
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import (

@@ -1,0 +1,32 @@
+"""What a look comes to: hypotheses fitted in full, and what they lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.trial import Trial
+
+#: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
+#: than so much and whole runs do not refute it.
+Law = Callable[[Problem, Evaluation, float], Explained | None]
+
+#: Log evidence that an effect has to gain.
+MEANT = 3.0
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Hypotheses fitted in full, most likely first, and the device that contradicts all others."""
+
+    done: list[Trial]
+    liar: str | None = None
+    beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
+    lawful: Explained | None = None  # what explains the session instead
+    led: bool = False  # the first leads to another one, with which nothing is left
+    chief: bool = True  # whether the first takes the larger part of what was left away
+    beside: tuple[Trial, ...] = ()  # what it leads to, likeliest first, where that is fitted already
+    asked: bool = False  # whether rivals of that were asked as well
+    left: float = 0.0  # nats, without any of them
