@@ -14,6 +14,7 @@ from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.screen import carried, extended, screen, with_reference
 from rig_identification.mismatch.trial import log_evidence, mass_of
+from rig_identification.mismatch.undecided import shared_by_places
 from rig_identification.result import Identification
 from rig_identification.simulate import simulate_session
 
@@ -103,3 +104,11 @@ def test_what_a_freed_doubt_is_charged_is_what_evidence_takes_for_it() -> None:
         charged = before - log_evidence(there) - (there.cost - evaluation.cost)
         assert promise.charge == pytest.approx(charged, abs=0.02)
         assert charged > 0.5
+
+
+def test_places_that_explain_as_much_make_an_effect_likelier_together() -> None:
+    trailing = [("hinge", 3.8)] * 4 + [("hinge", 40.0), ("level", 2.0), ("cell", 1.0), ("cell", 9.0)]
+    shared = shared_by_places(trailing)
+    assert shared["hinge"] == pytest.approx(np.log(4.0))
+    assert shared["level"] == pytest.approx(0.0)
+    assert 0.0 < shared["cell"] < 1e-3

@@ -6,17 +6,19 @@ makes of the recordings is another one than with it. So it is fitted, stated as 
 nothing, and the body's interval covers both (estimate/mixture.py).
 
 How far it trails: half the log of how much sharper the recordings know its amount than the prior does, and
-the log of the number of hypotheses that are as likely as it is beforehand, less what it gains. What every
-rig has some of, as all cables weigh and all bodies take air along, is no chance among many: of that only the
-amount is asked.
+the log of the number of hypotheses that are as likely as it is beforehand, less what it gains. Where several
+places of one effect explain as much, as upper hinges that share a load do, their likelihoods add: that some
+hinge is off is likelier than that this one is. What every rig has some of, as all cables weigh and all bodies
+take air along, is no chance among many: of that only the amount is asked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from rig_identification.estimate.identify import ORDINARY, Ideal
 from rig_identification.estimate.mixture import Bodies
@@ -90,6 +92,17 @@ def undecided_beside(
     )
 
 
+def shared_by_places(trailing: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Nats by which an effect anywhere is likelier than at its likeliest place, by kind.
+
+    trailing: kind of every hypothesis, and nats by which it trails.
+    """
+    behind: dict[str, list[float]] = {}
+    for kind, gap in trailing:
+        behind.setdefault(kind, []).append(gap)
+    return {kind: min(gaps) + float(logsumexp(-np.array(gaps))) for kind, gaps in behind.items()}
+
+
 def _neither_shown_nor_excluded(
     problem: Problem,
     evaluation: Evaluation,
@@ -110,9 +123,15 @@ def _neither_shown_nor_excluded(
     def trails(promise: Promise) -> float:
         return (promise.charge or 0.0) + chance(promise.candidate) - promise.gain
 
-    close = [p for p in promises if p.charge is not None and trails(p) < TIED]
+    known = [p for p in promises if p.charge is not None]
+    shared = shared_by_places((p.candidate.kind, trails(p)) for p in known)
+
+    def trails_anywhere(promise: Promise) -> float:
+        return trails(promise) - shared[promise.candidate.kind]
+
+    close = [p for p in known if trails_anywhere(p) < TIED]
     stated: list[tuple[float, Trial]] = []
-    for promise in sorted(close, key=trails)[:ASKED]:
+    for promise in sorted(close, key=trails_anywhere)[:ASKED]:
         if len(stated) == STATED:
             break
         if any(t.candidate.kind == promise.candidate.kind for _, t in stated):
@@ -123,7 +142,7 @@ def _neither_shown_nor_excluded(
         ended = None if begun is None else finished(begun, budget)
         if ended is None or not ended.settled or not beyond_doubt(ended, ordinary, ORDINARY):
             continue
-        gap = nothing + chance(promise.candidate) - ended.evidence
+        gap = nothing + chance(promise.candidate) - ended.evidence - shared[promise.candidate.kind]
         if gap < TIED:
             stated.append((max(gap, 0.0), ended))
     return sorted(stated, key=lambda s: s[0])
