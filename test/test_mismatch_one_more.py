@@ -40,7 +40,7 @@ def both() -> tuple[Identification, np.ndarray]:
 
 def test_air_beside_a_turned_inclinometer_is_told(both: tuple[Identification, np.ndarray]) -> None:
     found, deviation = both
-    assert {f.effect for f in found.mismatch.findings} == {"inclinometer_offset", "air_added_mass"}
+    assert [f.effect for f in found.mismatch.findings] == ["inclinometer_offset", "air_added_mass"]
     air = next(f for f in found.mismatch.findings if f.effect == "air_added_mass").parameters["added_mass"]
     assert abs(air["value"] - AIR) < 3.0 * air["std"]  # type: ignore[operator]
     assert np.max(np.abs(deviation)) < 3.5

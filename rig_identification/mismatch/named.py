@@ -214,7 +214,8 @@ def _one_more(
         if tried.done:
             beside.adopt(tried, tried.done[0])
             notify("search: whole runs with " + ", ".join(t.candidate.label for t in beside.found), 0.95)
-            both = whole_runs(ideal, beside)
+            # What all residuals are noise with comes before what is found within that noise, and bends to it
+            both = whole_runs(ideal, beside, as_found=True)
             if _wholly(both):
                 return both
     return undecided_beside(best, promises, count_of(left), notify, search.budget)

@@ -56,6 +56,8 @@ def told_of(look: Look, done: list[Trial]) -> list[Trial]:
 
 def _simpler(look: Look, trial: Trial, known: set[str]) -> list[Trial]:
     """Special cases of a trial that are worth telling beside it. known: labels of what is told."""
+    if look.budget.spent():
+        return []
     judged = set() if look.far else {t.candidate.label for t in look.tried}
     unknown = [c for c in look.candidates if c.label not in known | judged]
     simpler = [_fair(look, t) for t in fitted_simpler(look.here, trial, unknown)]

@@ -23,19 +23,30 @@ from rig_identification.result import Finding, Mismatch
 FIRM = 10.0
 
 
-def whole_runs(ideal: Ideal, search: Search) -> Explained:
-    return _fitted_whole(ideal, search, search.found, search.here, search.evaluation.point)
+def whole_runs(ideal: Ideal, search: Search, *, as_found: bool = False) -> Explained:
+    """Whole runs with what was found. as_found: it is told in that order, whatever says most."""
+    known = search.evaluation.point
+    return _fitted_whole(ideal, search, search.found, search.here, known, as_found=as_found)
 
 
-def _fitted_whole(ideal: Ideal, search: Search, found: list[Trial], here: Problem, known: Point) -> Explained:
+def _fitted_whole(
+    ideal: Ideal,
+    search: Search,
+    found: list[Trial],
+    here: Problem,
+    known: Point,
+    *,
+    as_found: bool = False,
+) -> Explained:
     """Whole runs with the effects ``found``, from a ``known`` point of the problem ``here``."""
     whole = extended(search.problem, tuple(t.candidate for t in found))
     point = replace(known, theta=carried(whole, here, known).theta)
     curved = any(t.candidate.curved for t in found)
     fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
-    # What says most comes first, whatever was found first. Without its effect an error goes to its bound
-    bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
-    found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
+    if not as_found:
+        # What says most comes first, whatever was found first. Without its effect an error goes to its bound
+        bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
+        found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
     after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
     # a held-out run that cannot be followed, of which there is no residual to hear
