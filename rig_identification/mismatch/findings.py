@@ -26,8 +26,10 @@ def effects_of(findings: Sequence[Finding]) -> str:
 def called(effect: str, where: Mapping[str, object]) -> str:
     """An effect by name; what the contract's table has no word for, by its law and where it is."""
     channel, law = where.get("channel"), where.get("law")
-    if effect != "unknown" or not channel:
+    if effect != "unknown":
         return effect
+    if not channel:
+        return effect if law is None else str(law)
     return f"what bends {channel}" if law is None else f"a {law} of {channel}"
 
 
