@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_mismatch_two_errors import wrong
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import ORDINARY, fit_session, near_noise, parameter_estimates
@@ -61,12 +62,8 @@ def test_it_is_a_hose_and_no_two_errors_of_cells(pulled: tuple[Problem, Evaluati
 
 def test_a_cells_zero_is_no_steady_pull() -> None:
     made = simulate_session(shaken(12, 12.0), np.random.default_rng(4))[0]
-    recordings = []
-    for recording in made.recordings:
-        name, tension = next(iter(recording.tension.items()))
-        loud = {**recording.tension, name: replace(tension, values=tension.values + PULL)}
-        recordings.append(replace(recording, tension=loud))
-    problem, _, promises = _promised(replace(made, recordings=tuple(recordings)))
+    loud = replace(made, recordings=tuple(wrong(r, 0.0, PULL) for r in made.recordings))
+    problem, _, promises = _promised(loud)
     worthy = worth_a_fit(promises, count_of(catalogue(problem)))
     assert any(p.candidate.label.startswith("load_cell_offset") for p in worthy)
     assert not any(p.steady for p in worthy)

@@ -22,7 +22,7 @@ from rig_identification.simulate import simulate_session
 TURNED, TOO_MUCH = 0.004, 40.0
 
 
-def _wrong(recording: Recording, turned: float, too_much: float) -> Recording:
+def wrong(recording: Recording, turned: float, too_much: float) -> Recording:
     """The recording as two devices that are a little wrong would have made it."""
     name, tension = next(iter(recording.tension.items()))
     inclination = recording.inclination
@@ -35,7 +35,7 @@ def _wrong(recording: Recording, turned: float, too_much: float) -> Recording:
 def _session(turned: float, too_much: float) -> Session:
     spec = shaken(14, 12.0)
     made = simulate_session(spec, np.random.default_rng(5))[0]
-    return replace(made, recordings=tuple(_wrong(r, turned, too_much) for r in made.recordings))
+    return replace(made, recordings=tuple(wrong(r, turned, too_much) for r in made.recordings))
 
 
 def _first(session: Session) -> tuple[Fitted, Trial | None, list[str]]:

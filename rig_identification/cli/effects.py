@@ -18,8 +18,8 @@ _OF_DEVICE = {
     "load_cell_zero": "load_cell_offset",
     "clock": "clock_offset",
 }
-#: Switches that belong to an effect of another name.
-_OF_SWITCH = {"cable_damping_ratio": "cable_elasticity"} | dict.fromkeys(
+#: Switches that belong to an effect of another name; ropes that twist have none in the contract's table.
+_OF_SWITCH = {"cable_damping_ratio": "cable_elasticity", "cable_torsion": "unknown"} | dict.fromkeys(
     ("tether_point", "tether_pull", "tether_reach"), "tether"
 )
 
@@ -40,8 +40,8 @@ def effect_of(name: str) -> str:
     """The contract's effect that a switch, or a device's error, belongs to."""
     first, _, rest = name.partition(".")
     kind = rest.partition(".")[0]
-    if first == "cable_torsion" or {"feels", "drift", "load_cell_curve"} & set(rest.split(".")):
-        # What the contract's table has no word for: a law of a reading, ropes that twist
+    if {"feels", "drift", "load_cell_curve"} & set(rest.split(".")):
+        # A law of a reading, which the contract's table has no word for
         return "unknown"
     if kind == "orientation":
         return "imu_misalignment" if first == "imu" else "inclinometer_offset"

@@ -31,6 +31,9 @@ AT_NOISE = 1.05
 RIVAL = 10.0
 #: Share of what was left up to which a hypothesis, after its first steps, is fitted to its end at once.
 ALMOST = 0.15
+#: Share of what was left that no stand-in comes down to: one bends to most of what it stands in for, and
+#: leaves a part in ten or in a hundred of it.
+NO_STAND_IN = 1e-3
 #: Hypotheses that are tried on top of another one, which leaves something.
 FURTHER = 4
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.

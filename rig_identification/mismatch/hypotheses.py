@@ -89,17 +89,18 @@ def needed_gain(candidate: Candidate, count: int) -> float:
     return 0.5 * float(chi2.isf(FALSE_ALARM * share, len(candidate.parameters)))
 
 
+def net_gain(promise: Promise, count: int) -> float:
+    """What a promise gains (nats) beyond what noise gives one of ``count``."""
+    return promise.gain - needed_gain(promise.candidate, count)
+
+
 def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
     """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie.
 
     A steady pull, of six numbers, bends to any cell's zero or a level: it is worth one where it is likelier.
     """
-
-    def net(promise: Promise) -> float:
-        return promise.gain - needed_gain(promise.candidate, count)
-
-    single = max((net(p) for p in promises if not p.steady), default=0.0)
-    worthy = [p for p in promises if net(p) > (max(single, 0.0) if p.steady else 0.0)]
+    single = max((net_gain(p, count) for p in promises if not p.steady), default=0.0)
+    worthy = [p for p in promises if net_gain(p, count) > (max(single, 0.0) if p.steady else 0.0)]
     if device is not None:
         worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
     out: list[Promise] = []

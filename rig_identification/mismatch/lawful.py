@@ -167,22 +167,23 @@ def _fitted(
         if misfit(evaluation) > NEAR_SQUARE:
             for end in HORIZONS:
                 part = held_over(wide, end, there.theta[:INERTIAL].copy())
-                there = replace(there, starts=settled_starts(part, there))
-                reached = _solved(part, there, STEPS, budget)[0]
+                reached = _grown(part, there, STEPS, budget)[0]
                 if end > HORIZONS[0] and misfit(reached) > NEAR_SQUARE:
                     # What a law does not explain over a second it will not over two
                     return None
                 there = reached.point
             longest = max(run.grid.duration for run in wide.runs)
             for end in (end for end in LONGER if end < longest):
-                part = shortened(wide, end)
-                there = replace(there, starts=settled_starts(part, there))
-                there = _solved(part, there, STEPS, budget)[0].point
-        there = replace(there, starts=settled_starts(wide, there))
-        fitted, settled = _solved(wide, there, LAST_STEPS, budget)
+                there = _grown(shortened(wide, end), there, STEPS, budget)[0].point
+        fitted, settled = _grown(wide, there, LAST_STEPS, budget)
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), settled)
+
+
+def _grown(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple[Evaluation, bool]:
+    """Longer runs than those of ``point``, their start states settled before anything else moves."""
+    return _solved(problem, replace(point, starts=settled_starts(problem, point)), steps, budget)
 
 
 def _solved(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple[Evaluation, bool]:

@@ -13,8 +13,8 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
+from rig_identification.mismatch.first_fits import NO_STAND_IN
 from rig_identification.mismatch.locate import DRIVE
-from rig_identification.mismatch.look import NEXT_TO_NONE
 from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -38,11 +38,12 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         best = whole_runs(ideal, search)
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
-    convincing = convincing and best is not None and misfit(best.fitted.evaluation) < WRONG
-    nearly_all = convincing and best is not None and _next_to_none(ideal, best)
-    if convincing and best is not None and (nearly_all or not hear(best.fitted).contradicted):
-        kept: tuple[Finding, ...] = best.mismatch.findings
-        fitted, explanation, rivals = best.fitted, best.mismatch.explanation, best.mismatch.alternatives
+    told = best if convincing and best is not None and misfit(best.fitted.evaluation) < WRONG else None
+    nearly_all = told is not None and _next_to_none(ideal, told)
+    heard = None if told is None else hear(told.fitted)
+    if told is not None and heard is not None and (nearly_all or not heard.contradicted):
+        kept: tuple[Finding, ...] = told.mismatch.findings
+        fitted, explanation, rivals = told.fitted, told.mismatch.explanation, told.mismatch.alternatives
     else:
         kept, fitted, explanation = (), ideal.fitted, ideal.mismatch.explanation
         partly = [rival(t, 0.0) for t in search.found]
@@ -67,13 +68,12 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
-    looseness = 1.0
-    if fitted is not ideal.fitted:
+    if fitted is ideal.fitted:
+        # Far from the noise the cautious fit knows by itself how little it knows
+        looseness = hear(fitted).looseness if near_noise(fitted) else 1.0
+    else:
         # With what is told in the model the body comes from whole runs, as loosely as these disagree
-        ideal, looseness = replace(ideal, careful=None), hear(fitted).looseness
-    elif near_noise(fitted):
-        looseness = hear(fitted).looseness
-    # Far from the noise the cautious fit knows by itself how little it knows
+        ideal, looseness = replace(ideal, careful=None), (heard or hear(fitted)).looseness
     return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, looseness)
 
 
@@ -82,7 +82,7 @@ def _next_to_none(ideal: Ideal, best: Explained) -> bool:
 
     Dry hinges of which a part in a million is left are dry, whatever else a loose part does to the body.
     """
-    return excess(best.fitted.evaluation) < NEXT_TO_NONE * excess(ideal.fitted.evaluation)
+    return excess(best.fitted.evaluation) < NO_STAND_IN * excess(ideal.fitted.evaluation)
 
 
 def _something_loose(

@@ -28,6 +28,7 @@ from rig_identification.mismatch.first_fits import (
     BEATEN,
     CLOSE,
     DIRECT,
+    NO_STAND_IN,
     Notify,
     almost,
     at_noise,
@@ -54,9 +55,6 @@ from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, 
 
 #: Hypotheses that get to their end.
 FINISHED = 3
-#: Share of what was left that no stand-in comes down to: one bends to most of what it stands in for, and
-#: leaves a part in ten or in a hundred of it.
-NEXT_TO_NONE = 1e-3
 #: What gives way or swings that is tried before changes of numbers which promise less.
 AT_ONCE = 3
 
@@ -143,7 +141,7 @@ class Look:
 
     def enough_with(self, trial: Trial) -> bool:
         """Whether a trial leaves only noise, or next to nothing of what was left."""
-        return at_noise(trial) or excess(trial.evaluation) < NEXT_TO_NONE * excess(self.seen)
+        return at_noise(trial) or excess(trial.evaluation) < NO_STAND_IN * excess(self.seen)
 
     def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
         """First fits of promises about an evaluation; about another one's than ``seen`` all have a chance."""

@@ -14,7 +14,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.first_fits import AT_NOISE, at_noise
-from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, needed_gain, worth_a_fit
+from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, net_gain, worth_a_fit
 from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.outcome import Law, Trials
 from rig_identification.mismatch.push import push_too
@@ -270,7 +270,7 @@ def _most_promising(
         others = compatible(candidates, [t.candidate for t in search.found])
         mass = mass_of(search.here, search.evaluation)
         search.screened = screen(search.here, search.evaluation, others, mass)
-        gains = [p.gain - needed_gain(p.candidate, count) for p in search.screened]
+        gains = [net_gain(p, count) for p in search.screened]
         likely = log_evidence(search.evaluation) + max(0.0, *gains)
         if best is None or likely > best[0]:
             best = likely, found, search

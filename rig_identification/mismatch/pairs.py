@@ -16,9 +16,9 @@ from itertools import combinations
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import compatible, needed_gain
+from rig_identification.mismatch.hypotheses import compatible, needed_gain, net_gain
 from rig_identification.mismatch.screen import Promise, promises_of, together
-from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, finished, ordinary_errors
+from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, fitted_to_its_end, ordinary_errors
 
 Notify = Callable[[str], None]
 
@@ -50,8 +50,8 @@ def first_of_two(
     promises: of all hypotheses about ``evaluation``, best first; count: of all hypotheses. ahead: nats by
     which a pair has to be worth more. limit: of ordinary errors, in tolerances.
     """
-    single = max(promises, key=lambda p: p.gain - needed_gain(p.candidate, count), default=None)
-    alone = 0.0 if single is None else single.gain - needed_gain(single.candidate, count)
+    single = max(promises, key=lambda p: net_gain(p, count), default=None)
+    alone = 0.0 if single is None else net_gain(single, count)
     likely = {p.candidate.label: p for p in promises if not p.candidate.slow and p.candidate.settle is None}
     plain = list(likely.values())[:PAIRED]
     pairs = [
@@ -67,8 +67,7 @@ def first_of_two(
         return None
     one, other = pairs[worth.index(max(worth))]
     notify(f"{one.label} and {other.label}")
-    begun = attempt(problem, evaluation, likely[one.label], budget)
-    first = None if begun is None else finished(begun, budget)
+    first = fitted_to_its_end(problem, evaluation, likely[one.label], budget)
     if first is None:
         return None
     (promise,) = promises_of(first.problem, first.evaluation, [other])
@@ -85,8 +84,7 @@ def first_of_two(
     slow = None
     if single is not None and single.candidate.slow and alone > 0.0 and not budget.spent():
         notify(single.candidate.label)
-        begun = attempt(problem, evaluation, single, budget)
-        slow = None if begun is None else finished(begun, budget)
+        slow = fitted_to_its_end(problem, evaluation, single, budget)
     instead = slow is not None and slow.evidence > second.evidence - ahead
     return Led(first, not instead, slow if instead else None)
 

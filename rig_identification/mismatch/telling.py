@@ -21,10 +21,10 @@ from rig_identification.mismatch.trial import (
     among_places,
     amount_seen,
     as_it_stands,
-    attempt,
     beyond_doubt,
     earned_evidence,
     finished,
+    fitted_to_its_end,
     log_evidence,
 )
 
@@ -42,8 +42,7 @@ def told_of(look: Look, done: list[Trial]) -> list[Trial]:
         if lag is None or any(t.candidate.label == lag.candidate.label for t in out):
             continue
         look.notify(lag.candidate.label)
-        begun = attempt(look.here, look.seen, lag, look.budget)
-        twin = None if begun is None else finished(begun, look.budget)
+        twin = fitted_to_its_end(look.here, look.seen, lag, look.budget)
         if twin is not None and twin.evidence > look.needed:
             out.append(twin)
     for trial in done:
@@ -92,15 +91,15 @@ def ended(look: Look) -> Trials:
         lone = lone and not any(_rivals(look, t, trial) for t in look.tried)
         # What is beaten is stated as it is: a closer description of it takes half a minute
         plain = replace(trial, candidate=replace(trial.candidate, closer=None)) if last else trial
-        ended = as_it_stands(plain) if lone else finished(plain, look.budget)
-        if ended is None or not beyond_doubt(ended, look.ordinary, look.limit):
+        fitted = as_it_stands(plain) if lone else finished(plain, look.budget)
+        if fitted is None or not beyond_doubt(fitted, look.ordinary, look.limit):
             continue
-        if not look.far and not amount_seen(ended) and not _missed(look, ended):
+        if not look.far and not amount_seen(fitted) and not _missed(look, fitted):
             # It explains something, with an amount that may as well be none: it stands in for another
             continue
-        ended = _fair(look, ended)
-        if ended.evidence > look.needed:
-            _place(ended, beaten if last else done)
+        fitted = _fair(look, fitted)
+        if fitted.evidence > look.needed:
+            _place(fitted, beaten if last else done)
     told = told_of(look, done)
     chief = bool(told) and excess(told[0].evaluation) < CHIEF * look.left
     return Trials(told, look.device, tuple(map(among_places, beaten)), chief=chief, left=look.left)

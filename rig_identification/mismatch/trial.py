@@ -334,6 +334,14 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
     return replace(closest, candidate=replace(closest.candidate, closer=None))
 
 
+def fitted_to_its_end(
+    problem: Problem, evaluation: Evaluation, promise: Promise, budget: Budget = UNLIMITED
+) -> Trial | None:
+    """A promise's first steps, and the trial fitted to its end; None where either leads nowhere."""
+    begun = attempt(problem, evaluation, promise, budget)
+    return None if begun is None else finished(begun, budget)
+
+
 def as_it_stands(trial: Trial) -> Trial | None:
     """The trial where its first steps led; None where its sign makes no sense."""
     return trial if _sensible(trial) else None

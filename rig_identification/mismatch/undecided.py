@@ -32,9 +32,8 @@ from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import (
     Trial,
-    attempt,
     beyond_doubt,
-    finished,
+    fitted_to_its_end,
     log_evidence,
     ordinary_errors,
 )
@@ -138,8 +137,7 @@ def _neither_shown_nor_excluded(
             # Its other places are its rivals anyway
             continue
         notify(f"search: {promise.candidate.label}, which may be there", 0.5)
-        begun = attempt(problem, evaluation, promise, budget)
-        ended = None if begun is None else finished(begun, budget)
+        ended = fitted_to_its_end(problem, evaluation, promise, budget)
         if ended is None or not ended.settled or not beyond_doubt(ended, ordinary, ORDINARY):
             continue
         gap = nothing + chance(promise.candidate) - ended.evidence - shared[promise.candidate.kind]

@@ -11,6 +11,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.effects.direction import cable_direction
 from rig_identification.model.effects.place import LINEAR_DENSITY, active
 from rig_identification.model.effects.point import force_at
 from rig_identification.model.layout import (
@@ -44,14 +45,7 @@ def add_cable_mass(physics, block, modes, x, R, K, r):  # type: ignore[no-untype
         o = CABLES + CABLE_SIZE * i
         mass = density * physics[o + LENGTH]
         bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-        d0 = x[0] - physics[o + CEILING_POINT]
-        d1 = x[1] - physics[o + CEILING_POINT + 1]
-        d2 = x[2] - physics[o + CEILING_POINT + 2]
-        ex = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 + bx
-        ey = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 + by
-        ez = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 + bz
-        k = reciprocal(root(ex * ex + ey * ey + ez * ez))
-        ex, ey, ez = ex * k, ey * k, ez * k
+        ex, ey, ez, _ = cable_direction(physics, o, x[0], x[1], x[2], R)
         # Right side: m/2 P g - m/3 P (w x (w x b))
         tx, ty, tz = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
         qx = 0.5 * gx - (wy * tz - wz * ty) * (1.0 / 3.0)

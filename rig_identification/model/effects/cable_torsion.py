@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from numba import njit
 
-from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.effects.direction import cable_direction
 from rig_identification.model.effects.place import REFERENCE_ROTATION, TORSION, active
-from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, CEILING_POINT, SLACK
+from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, SLACK
 
 
 @njit(cache=True)
@@ -44,14 +44,7 @@ def add_cable_torsion(physics, block, modes, x, R, r):  # type: ignore[no-untype
             continue
         o = CABLES + CABLE_SIZE * i
         bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-        d0 = x[0] - physics[o + CEILING_POINT]
-        d1 = x[1] - physics[o + CEILING_POINT + 1]
-        d2 = x[2] - physics[o + CEILING_POINT + 2]
-        ux = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 + bx
-        uy = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 + by
-        uz = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 + bz
-        per_length = reciprocal(root(ux * ux + uy * uy + uz * uz))
-        ux, uy, uz = ux * per_length, uy * per_length, uz * per_length
+        ux, uy, uz, per_length = cable_direction(physics, o, x[0], x[1], x[2], R)
         twist = wx * ux + wy * uy + wz * uz
         moment, half = -stiffness * twist, -0.5 * stiffness * twist
         fx = moment * per_length * (wx - twist * ux)

@@ -16,6 +16,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.effects.direction import cable_direction
 from rig_identification.model.effects.place import (
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
@@ -24,20 +25,7 @@ from rig_identification.model.effects.place import (
     ROLL_STIFFNESS,
     active,
 )
-from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, CEILING_POINT, SLACK
-
-
-@njit(cache=True)
-def _direction(physics, o, p0, p1, p2, R):  # type: ignore[no-untyped-def]
-    """Unit vector from cable's ceiling to its body hinge, body axes, and the reciprocal of their distance."""
-    d0 = p0 - physics[o + CEILING_POINT]
-    d1 = p1 - physics[o + CEILING_POINT + 1]
-    d2 = p2 - physics[o + CEILING_POINT + 2]
-    ex = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 + physics[o + BODY_POINT]
-    ey = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 + physics[o + BODY_POINT + 1]
-    ez = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 + physics[o + BODY_POINT + 2]
-    per_length = reciprocal(root(ex * ex + ey * ey + ez * ez))
-    return ex * per_length, ey * per_length, ez * per_length, per_length
+from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, SLACK
 
 
 @njit(cache=True)
@@ -71,8 +59,8 @@ def add_hinge_roll(physics, block, modes, x, R, r):  # type: ignore[no-untyped-d
         if modes[i] == SLACK:
             continue
         o = CABLES + CABLE_SIZE * i
-        fx, fy, fz, _ = _direction(physics, o, physics[p], physics[p + 1], physics[p + 2], rest)
-        ex, ey, ez, _ = _direction(physics, o, x[0], x[1], x[2], R)
+        fx, fy, fz, _ = cable_direction(physics, o, physics[p], physics[p + 1], physics[p + 2], rest)
+        ex, ey, ez, _ = cable_direction(physics, o, x[0], x[1], x[2], R)
         turned += ax * (fy * ez - fz * ey) + ay * (fz * ex - fx * ez) + az * (fx * ey - fy * ex)
         taut += 1.0
     if taut == 0.0:
@@ -82,8 +70,8 @@ def add_hinge_roll(physics, block, modes, x, R, r):  # type: ignore[no-untyped-d
         if modes[i] == SLACK:
             continue
         o = CABLES + CABLE_SIZE * i
-        fx, fy, fz, _ = _direction(physics, o, physics[p], physics[p + 1], physics[p + 2], rest)
-        ex, ey, ez, per_length = _direction(physics, o, x[0], x[1], x[2], R)
+        fx, fy, fz, _ = cable_direction(physics, o, physics[p], physics[p + 1], physics[p + 2], rest)
+        ex, ey, ez, per_length = cable_direction(physics, o, x[0], x[1], x[2], R)
         # e x (a x e0) = a (e . e0) - e0 (e . a)
         along, aside = ex * fx + ey * fy + ez * fz, ex * ax + ey * ay + ez * az
         mx, my, mz = (

@@ -5,11 +5,11 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.arithmetic import reciprocal, root
+from rig_identification.model.effects.direction import cable_direction
 from rig_identification.model.layout import (
     BODY_POINT,
     CABLE_SIZE,
     CABLES,
-    CEILING_POINT,
     RATE,
     SLACK,
     VELOCITY,
@@ -39,14 +39,7 @@ def add_hinge_moments(physics, modes, x, R, viscous, rubbing, creep, twist, r): 
             continue
         o = CABLES + CABLE_SIZE * i
         bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-        d0 = x[0] - physics[o + CEILING_POINT]
-        d1 = x[1] - physics[o + CEILING_POINT + 1]
-        d2 = x[2] - physics[o + CEILING_POINT + 2]
-        ex = R[0, 0] * d0 + R[1, 0] * d1 + R[2, 0] * d2 + bx
-        ey = R[0, 1] * d0 + R[1, 1] * d1 + R[2, 1] * d2 + by
-        ez = R[0, 2] * d0 + R[1, 2] * d1 + R[2, 2] * d2 + bz
-        per_length = reciprocal(root(ex * ex + ey * ey + ez * ez))
-        ex, ey, ez = ex * per_length, ey * per_length, ez * per_length
+        ex, ey, ez, per_length = cable_direction(physics, o, x[0], x[1], x[2], R)
         sx = (vx + wy * bz - wz * by) * per_length
         sy = (vy + wz * bx - wx * bz) * per_length
         sz = (vz + wx * by - wy * bx) * per_length
