@@ -104,7 +104,7 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
     With the effects in the model all other pieces are noise, and so is all of every run outside the push.
     """
     squares = [float(np.mean(run.residual**2)) for run in search.evaluation.runs]
-    if np.median(squares) > CALM:
+    if max(squares) < UNEVEN * float(np.median(squares)) and np.median(squares) > CALM:
         return None
     notify("search: a push beside " + ", ".join(t.candidate.label for t in search.found), 0.6)
     event = find_event(search.here, search.evaluation)
