@@ -24,7 +24,7 @@ from rig_identification.mismatch.push import (
     with_push,
     without_push,
 )
-from rig_identification.mismatch.screen import screen, with_reference
+from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
 from rig_identification.mismatch.trial import mass_of
@@ -83,14 +83,20 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     fitted = ideal.fitted
     notify("search: a push", 0.02)
     pulse = likeliest_pulse(fitted)
-    pulsed = None if pulse is None else _pulsed(ideal, pulse, notify, budget)
-    if pulsed is not None:
-        return pulsed
     problem = with_reference(fitted.problem, fitted.rest)
+    promises: list[Promise] | None = None
+    # Far from the noise first order tells of a push only where little else is wrong
+    if pulse is not None and (near_noise(fitted) or chiefly(pulse, fitted)):
+        promises = screen(problem, fitted.evaluation, catalogue(problem), mass_of(problem, fitted.evaluation))
+        pulsed = _pulsed(ideal, pulse, promises, notify, budget)
+        if pulsed is not None:
+            return pulsed
     here, evaluation = short_pieces(ideal) or (problem, evaluate(problem, fitted.evaluation.point))
     if evaluation is None:
         return None
     search = Search(problem, here, evaluation, excess(evaluation), budget)
+    if search.whole:
+        search.screened = promises
     pushed = None if search.whole else without_push(ideal, problem, here, evaluation, pulse, notify)
     if pushed is not None:
         return pushed
@@ -117,13 +123,13 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     return unexplained(ideal, search, best, notify)
 
 
-def _pulsed(ideal: Ideal, pulse: Pulse, notify: Notify, budget: Budget) -> Explained | None:
-    """What explains the session outside a push that takes most away; None where none does, or nothing."""
-    fitted = ideal.fitted
-    if not chiefly(pulse, fitted):
-        return None
-    problem = with_reference(fitted.problem, fitted.rest)
-    promises = screen(problem, fitted.evaluation, catalogue(problem), mass_of(problem, fitted.evaluation))
+def _pulsed(
+    ideal: Ideal, pulse: Pulse, promises: list[Promise], notify: Notify, budget: Budget
+) -> Explained | None:
+    """What explains the session outside a push likelier than all else; None where there is none, or nothing.
+
+    promises: of everything else, about the ideal model's fit.
+    """
     if promises and promises[0].gain > pulse.net:
         return None
     rest = outside_of_pulse(ideal, pulse, notify)
