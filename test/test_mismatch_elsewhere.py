@@ -34,6 +34,8 @@ LIQUID, RATE, PLACE = 6.0, 0.8, (1.2, 1.0, -0.8)
         ([1.0, 2.0, 9.5, 10.0, 9.9, 1.0], [3]),  # a neighbour is no peak
         ([9.0, 1.0, 2.0, 10.0], [3, 0]),  # at the ends
         ([5.0], [0]),
+        ([10.0, 9.6, 9.8, 9.0, 3.0, 8.5, 2.0], [0, 5]),  # beyond a valley, before a dent that comes closer
+        ([10.0, 9.6, 9.8, 3.0, 1.0], [0, 2]),  # a dent where nothing else comes close
     ],
 )
 def test_the_best_peak_and_the_next(gains: list[float], chosen: list[int]) -> None:

@@ -50,8 +50,13 @@ def test_names_that_leave_next_to_nothing_are_told_from_those_that_stand_in(
 ) -> None:
     ideal, search = damped
     assert not near_noise(ideal.fitted)
-    assert _next_to_none(ideal, whole_with(ideal, search, fit_of(search, "hinge_damping")))
-    assert not _next_to_none(ideal, aired[1])
+    damping = fit_of(search, "hinge_damping")
+    whole = whole_with(ideal, search, damping)
+    assert _next_to_none(ideal, whole, [damping])
+    assert not _next_to_none(ideal, aired[1], [aired[0]])
+    # What has numbers enough bends to as much of what is none of it
+    bends = replace(damping.candidate, parameters=damping.candidate.parameters * 6)
+    assert not _next_to_none(ideal, whole, [damping, replace(damping, candidate=bends)])
 
 
 def test_near_the_noise_what_takes_a_hundredth_of_what_shows_is_not_fitted(

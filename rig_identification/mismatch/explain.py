@@ -16,10 +16,12 @@ from rig_identification.mismatch.left_over import unexplained
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse
 from rig_identification.mismatch.push import (
+    Pushes,
     chiefly,
     outside,
     outside_of_pulse,
     push_beside,
+    shows_beside,
     with_pulse,
     with_push,
     without_push,
@@ -105,8 +107,11 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         return beside
     near = search.whole
     fresh = replace(search, found=[], rivals=[])
-    beside_push = partial(_beside_push, ideal, notify=notify, budget=budget)
-    best = named(ideal, search, notify, beside_push, law_of_pieces(ideal, fresh, notify))
+    pushes = Pushes(
+        partial(_beside_push, ideal, notify=notify, budget=budget),
+        partial(_beside_pulse, ideal, notify=notify, budget=budget),
+    )
+    best = named(ideal, search, notify, pushes, law_of_pieces(ideal, fresh, notify))
     if best is not None and best.mismatch.verdict == "explained":
         return best
     if near:
@@ -153,3 +158,16 @@ def _beside_push(
     if found is None or found.mismatch.verdict != "explained":
         return None
     return with_push(found, ideal, here, event)
+
+
+def _beside_pulse(ideal: Ideal, best: Explained, notify: Notify, budget: Budget) -> Explained | None:
+    """What explains the session outside a push that whole runs show with something in the model; or None.
+
+    best: near the noise, and what it leaves may be such a push.
+    """
+    notify("search: a push beside " + ", ".join(f.effect for f in best.mismatch.findings), 0.6)
+    pulse = likeliest_pulse(best.fitted)
+    if pulse is None or not shows_beside(pulse, best.fitted):
+        return None
+    rest = outside(ideal, pulse.recording, pulse.start, pulse.end, notify)
+    return with_pulse(explain(rest, [], notify, budget), rest, ideal, pulse, last=True)

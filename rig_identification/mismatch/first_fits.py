@@ -17,6 +17,7 @@ from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, worth_a_fit
+from rig_identification.mismatch.locate import EVENT_SHARE
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import VERY_FAR, Trial, attempt, finished
@@ -36,6 +37,8 @@ ALMOST = 0.15
 NO_STAND_IN = 1e-3
 #: Hypotheses that are tried on top of another one, which leaves something.
 FURTHER = 4
+#: Pieces of which some may hold what the others do not.
+FEWEST = 4
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
 SEEN = 4.0
 #: Near the noise: log evidence by which a hypothesis is beaten for good, and the share of what another one
@@ -60,6 +63,16 @@ def shows(evaluation: Evaluation) -> bool:
 def almost(trial: Trial, before: Evaluation) -> bool:
     """Whether a hypothesis leaves next to nothing of what was left ``before``, and yet more than noise."""
     return not at_noise(trial) and excess(trial.evaluation) < ALMOST * excess(before)
+
+
+def but_for_a_while(trial: Trial, before: Evaluation) -> bool:
+    """Whether a hypothesis leaves next to nothing, and that in a few pieces: the others are noise.
+
+    What acts in these alone, a push for one, is looked for with the hypothesis in the model.
+    """
+    squares = np.sort([float(np.mean(run.residual**2)) for run in trial.evaluation.runs])
+    calm = squares[: squares.size - int(EVENT_SHARE * squares.size)]
+    return squares.size >= FEWEST and almost(trial, before) and float(np.mean(calm)) < AT_NOISE
 
 
 def _coarse(trial: Trial, before: Evaluation) -> bool:

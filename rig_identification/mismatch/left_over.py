@@ -13,11 +13,11 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
-from rig_identification.mismatch.first_fits import NO_STAND_IN
+from rig_identification.mismatch.first_fits import NO_STAND_IN, shows
 from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.trial import Trial, mass_of
 from rig_identification.mismatch.unknown import unknown_finding
 from rig_identification.mismatch.whole_runs import whole_runs
 from rig_identification.result import Finding, Mismatch
@@ -39,7 +39,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
     told = best if convincing and best is not None and misfit(best.fitted.evaluation) < WRONG else None
-    nearly_all = told is not None and _next_to_none(ideal, told)
+    nearly_all = told is not None and _next_to_none(ideal, told, search.found)
     heard = None if told is None else hear(told.fitted)
     if told is not None and heard is not None and (nearly_all or not heard.contradicted):
         kept: tuple[Finding, ...] = told.mismatch.findings
@@ -65,7 +65,9 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
     if search.budget.spent():
         explanation += f" The search ended after {search.budget.seconds:.0f} s, short of some hypotheses."
-    unknown = _unknown(ideal.fitted, here, evaluation, search.liar)
+    # Where whole runs with what is told are noise, and something else contradicts, no force is missing
+    missing = not kept or shows(fitted.evaluation)
+    unknown = _unknown(ideal.fitted, here, evaluation, search.liar) if missing else None
     evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
     findings = kept if unknown is None else (*kept, replace(unknown, evidence=evidence))
     if fitted is ideal.fitted:
@@ -77,11 +79,14 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     return Explained(fitted, Mismatch("unexplained", explanation, findings, tuple(rivals)), ideal, looseness)
 
 
-def _next_to_none(ideal: Ideal, best: Explained) -> bool:
+def _next_to_none(ideal: Ideal, best: Explained, found: list[Trial]) -> bool:
     """Whether names leave so little of whole runs that they stand in for nothing, held-out runs or not.
 
     Dry hinges of which a part in a million is left are dry, whatever else a loose part does to the body.
+    What has numbers enough bends to as much of a force that is none of it, in the runs that it is fitted to.
     """
+    if any(trial.candidate.many for trial in found):
+        return False
     return excess(best.fitted.evaluation) < NO_STAND_IN * excess(ideal.fitted.evaluation)
 
 

@@ -33,6 +33,7 @@ from rig_identification.mismatch.first_fits import (
     almost,
     at_noise,
     begun,
+    but_for_a_while,
     leading,
     leaving_nothing,
     shows,
@@ -140,8 +141,9 @@ class Look:
         return max(there, excess(fitted)) if fitted.cost < self.seen.cost else there
 
     def enough_with(self, trial: Trial) -> bool:
-        """Whether a trial leaves only noise, or next to nothing of what was left."""
-        return at_noise(trial) or excess(trial.evaluation) < NO_STAND_IN * excess(self.seen)
+        """Whether a trial leaves only noise, but for a while maybe, or next to nothing of what was left."""
+        nothing = at_noise(trial) or excess(trial.evaluation) < NO_STAND_IN * excess(self.seen)
+        return nothing or but_for_a_while(trial, self.seen)
 
     def begin(self, worthy: list[Promise], about: Evaluation | None = None) -> None:
         """First fits of promises about an evaluation; about another one's than ``seen`` all have a chance."""

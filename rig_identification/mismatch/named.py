@@ -17,7 +17,7 @@ from rig_identification.mismatch.first_fits import AT_NOISE, at_noise
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, net_gain, worth_a_fit
 from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.outcome import Law, Trials
-from rig_identification.mismatch.push import push_too
+from rig_identification.mismatch.push import Pushes, push_too
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.search import MOST_EFFECTS, trials
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
@@ -28,12 +28,10 @@ from rig_identification.mismatch.whole_runs import pruned, whole_runs
 from rig_identification.mismatch.without_first import without_first
 
 Notify = Callable[[str, float], None]
-#: What explains a session outside a push that shows in short pieces as they are fitted; None: no push does.
-Beside = Callable[[Problem, Evaluation], Explained | None]
 
 
 def named(
-    ideal: Ideal, search: Search, notify: Notify, beside_push: Beside | None = None, law: Law | None = None
+    ideal: Ideal, search: Search, notify: Notify, pushes: Pushes | None = None, law: Law | None = None
 ) -> Explained | None:
     """Effects of the catalogue, one after the other, until the whole runs are explained.
 
@@ -89,20 +87,23 @@ def named(
             search.rivals += [rival(t, first.evidence - t.evidence) for t in tried.done]
             break
         search.adopt(tried, first, in_passing=known is not None and known.asked)
-        if not search.whole:
-            search.start = max(search.start, tried.left)
-            search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
+        search.start = max(search.start, tried.left)
+        search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
         more = known is not None or not search.budget.spent()
         led = tried.led and step + 1 < MOST_EFFECTS and more
+        pushable = pushes is not None and not search.budget.spent()
+        unfinished = led or misfit(search.evaluation) > EXPLAINED
+        if unfinished and pushable and not search.whole:
+            # A push among pieces that all lack something stands out with that in the model, and another
+            # effect may bend to it
+            pushed = push_too(ideal, before, tried, search, notify)
+            if pushed is not None:
+                return pushed
         if led:
             # With one more nothing is left: there is no use in whole runs without it
             continue
-        if misfit(search.evaluation) > EXPLAINED:
-            # A push among pieces that all lack something stands out with that in the model
-            if beside_push is not None and not search.whole and not search.budget.spent():
-                beside = push_too(ideal, search, notify)
-                if beside is not None:
-                    return beside
+        if unfinished:
+            if pushable and not search.whole:
                 uneven = uneven or (search.here, search.evaluation)
             if search.share < CHIEF:
                 # Two effects take nearly all away only where the first takes the larger part
@@ -135,8 +136,10 @@ def named(
             # What the first may have stood in for is taken out before anything is looked for beside it
             alone = kept is best and step + 1 < MOST_EFFECTS and not search.budget.spent()
             return _one_more(ideal, search, kept, left, notify) if alone else kept
-        if beside_push is not None and not search.whole and not search.budget.spent():
-            pushed = push_too(ideal, search, notify)
+        if pushes is not None and not search.budget.spent():
+            pushed = None if search.whole else push_too(ideal, before, tried, search, notify)
+            if pushed is None and near_noise(best.fitted):
+                pushed = pushes.in_whole_runs(best)
             if pushed is not None:
                 return pushed
         if asked:
@@ -174,9 +177,9 @@ def named(
     if told is not None and told.mismatch.verdict == "explained":
         # What leaves a trace may stand in for a law, which is asked where no second effect is that trace
         return (_lawful(lawful, search, notify) if lawful is not None else None) or told
-    if beside_push is not None and uneven is not None and not search.budget.spent():
+    if pushes is not None and uneven is not None and not search.budget.spent():
         # All is fitted anew outside of what stands out: only where one more effect does not explain it
-        return beside_push(*uneven) or told
+        return pushes.in_pieces(*uneven) or told
     return told
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.locate import CALM, Event, at_an_end, find_event
+from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse, pulse_finding
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.unknown import push_finding
+from rig_identification.mismatch.whole_rivals import likeliest_whole
 from rig_identification.mismatch.whole_runs import whole_runs
 from rig_identification.result import Finding, Mismatch
 
@@ -29,6 +31,17 @@ UNEVEN = 4.0
 MARGIN = 0.15
 #: Share of what is wrong in all runs that may be left outside a push for it to be the chief of it.
 OUTSIDE = 0.5
+#: Share of what is wrong with something in the model that a push has to take away, to first order, for the
+#: rest to be looked at without it.
+SEEN = 0.25
+
+
+@dataclass(frozen=True)
+class Pushes:
+    """How a session is explained outside a push that shows beside something else; None: it is not."""
+
+    in_pieces: Callable[[Problem, Evaluation], Explained | None]  # short pieces as they are fitted
+    in_whole_runs: Callable[[Explained], Explained | None]  # near the noise, with something in the model
 
 
 def without_push(
@@ -98,10 +111,11 @@ def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event 
     return find_event(here, evaluation, alone=False)
 
 
-def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
+def push_too(ideal: Ideal, before: Search, tried: Trials, search: Search, notify: Notify) -> Explained | None:
     """What was found, and a push that it leaves in short pieces; None where it leaves more, or no push.
 
     With the effects in the model all other pieces are noise, and so is all of every run outside the push.
+    before: where the search stood before the last of them; tried: what that was chosen from.
     """
     squares = [float(np.mean(run.residual**2)) for run in search.evaluation.runs]
     if max(squares) < UNEVEN * float(np.median(squares)) and np.median(squares) > CALM:
@@ -110,10 +124,22 @@ def push_too(ideal: Ideal, search: Search, notify: Notify) -> Explained | None:
     event = find_event(search.here, search.evaluation)
     if event is None or at_an_end(event, search.here):
         return None
-    runs = all_without(search.problem.runs, event.recording, event.start, event.end)
-    found = whole_runs(ideal, replace(search, problem=replace(search.problem, runs=runs)))
+    outside_of_it = replace(
+        search.problem, runs=all_without(search.problem.runs, event.recording, event.start, event.end)
+    )
+    its = replace(search, problem=outside_of_it)
+    found = whole_runs(ideal, its)
     if found.mismatch.verdict != "explained" or found.trace:
         return None
+    # What it was chosen from was heard with the push among the residuals
+    found, _ = likeliest_whole(
+        ideal,
+        replace(before, problem=outside_of_it),
+        tried,
+        found,
+        its,
+        lambda label: notify(f"search: whole runs with {label}", 0.6),
+    )
     return with_push(found, ideal, search.here, event)
 
 
@@ -171,6 +197,11 @@ def chiefly(pulse: Pulse, fitted: Fitted) -> bool:
     return pulse.net > (1.0 - OUTSIDE) * _wrong(fitted)
 
 
+def shows_beside(pulse: Pulse, fitted: Fitted) -> bool:
+    """Whether a push may be what a fit with something in its model leaves."""
+    return pulse.net > SEEN * _wrong(fitted)
+
+
 def outside_of_pulse(ideal: Ideal, pulse: Pulse, notify: Notify) -> Ideal | None:
     """The ideal model outside of a push; None where as much is wrong there as well."""
     rest = outside(ideal, pulse.recording, pulse.start, pulse.end, notify)
@@ -183,10 +214,13 @@ def _wrong(fitted: Fitted) -> float:
     return max(1.0, excess(fitted.evaluation) + held)
 
 
-def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse) -> Explained | None:
+def with_pulse(
+    found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse, *, last: bool = False
+) -> Explained | None:
     """What explains the session outside a push, and the push; None where something is left there.
 
     found: what is told of the rest; None where the ideal model explains it. rest: that model's fit outside.
+    last: the push takes less away than what is told of the rest.
     """
     found = found or Explained(rest.fitted, rest.mismatch, rest)
     if found.mismatch.verdict not in ("none", "explained") or found.trace:
@@ -196,12 +230,12 @@ def with_pulse(found: Explained | None, rest: Ideal, ideal: Ideal, pulse: Pulse)
         return replace(found, fitted=whole) if found.mismatch.verdict == "explained" else None
     pulse = _pulse_within(whole, pulse.recording, pulse.start, pulse.end) or pulse
     after = judged(found.fitted)[0].holdout
-    push = pulse_finding(pulse)
     evidence = evidence_of(ideal, found.fitted, after) | {"log_likelihood_gain": pulse.gain}
+    push = replace(pulse_finding(pulse), evidence=evidence)
     mismatch = Mismatch(
         "explained",
         f"Outside the push: {found.mismatch.explanation} {held_out_errors(ideal.scores.holdout, after)}",
-        (replace(push, evidence=evidence), *found.mismatch.findings),
+        (*found.mismatch.findings, push) if last else (push, *found.mismatch.findings),
         found.mismatch.alternatives if found.mismatch.findings else (),
     )
     return replace(found, mismatch=mismatch, ideal=ideal)

@@ -27,7 +27,7 @@ class Search:
     problem: Problem  # whole runs, ideal model
     here: Problem  # what hypotheses are tried on: short pieces where much is left, whole runs near the noise
     evaluation: Evaluation
-    start: float  # excess in short pieces before anything was found
+    start: float  # excess of what it looks at before anything was found
     budget: Budget
     share: float = 0.0  # of that excess that the effects found take away
     found: list[Trial] = field(default_factory=list)

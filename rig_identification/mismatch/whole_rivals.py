@@ -18,7 +18,7 @@ from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
-from rig_identification.mismatch.first_fits import BEATEN, at_noise
+from rig_identification.mismatch.first_fits import BEATEN
 from rig_identification.mismatch.in_motion import cost_in_motion
 from rig_identification.mismatch.late import SETTLING, twins
 from rig_identification.mismatch.outcome import MEANT, Trials
@@ -84,7 +84,6 @@ def _close(first: Trial, others: tuple[Trial, ...]) -> list[Trial]:
         if first.evidence - t.evidence < BEATEN
         and len(t.candidate.parameters) <= plain
         and not twins(first.candidate, t.candidate)
-        and at_noise(t)
     ]
 
 
