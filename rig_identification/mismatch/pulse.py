@@ -25,6 +25,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import pushed
+from rig_identification.mismatch.locate import EVENT_SHARE
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.screen import free_without, with_reference
@@ -71,7 +72,7 @@ class Pulse:
 def likeliest_pulse(fitted: Fitted) -> Pulse | None:
     """The push that takes most away of what a fit of whole runs leaves, held-out runs included.
 
-    None where nothing can be followed.
+    None where nothing can be followed, or what takes most away acts for as good as ever.
     """
     seen = _everything(fitted)
     if seen is None:
@@ -89,8 +90,11 @@ def likeliest_pulse(fitted: Fitted) -> Pulse | None:
     pulses, (best, _) = max(zip(every, scans, strict=True), key=lambda found: _gain(found[1][0]))
     if best is None:
         return None
+    shot = pulses.polished(best)
+    if not pulses.gone(shot):
+        return None
     tried = float(np.log(sum(count for _, count in scans)))
-    return pulses.told(pulses.polished(best), tried, middle_of(problem.bench.rig))
+    return pulses.told(shot, tried, middle_of(problem.bench.rig))
 
 
 def _gain(shot: _Shot | None) -> float:
@@ -166,6 +170,12 @@ class _Pulses:
             },
         )
         return max(at(found.x), shot, key=lambda s: s.gain)
+
+    def gone(self, shot: _Shot) -> bool:
+        """Whether a shot acts for a while within its run and is gone: what does not is no push."""
+        length = self._run.grid.duration
+        within = shot.begin > 0.0 and shot.begin + shot.duration < length
+        return within and shot.duration < EVENT_SHARE * length
 
     def told(self, shot: _Shot, trials: float, middle: Array) -> Pulse:
         """A shot in the recording's words. trials: log of how many were tried. middle: (3,) m, body."""
