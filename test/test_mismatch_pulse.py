@@ -89,7 +89,8 @@ def test_noise_alone_holds_no_push() -> None:
 def test_what_acts_for_as_good_as_ever_is_no_push() -> None:
     spec = shaken(14, 20.0)
     made = simulate_session(spec, np.random.default_rng(11))[0]
-    drawn = replace(made, recordings=tuple(moved(r, PUSH, -20.0, 60.0) for r in made.recordings))
+    recordings = tuple(moved(r, PUSH, 0.5, 39.0) if r.name == "run_1" else r for r in made.recordings)
+    drawn = replace(made, recordings=recordings)
     fitted = fit_session(drawn)
     assert Ideal(fitted, *judged(fitted)).mismatch.verdict != "none"
     assert likeliest_pulse(fitted) is None
