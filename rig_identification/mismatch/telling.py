@@ -112,12 +112,14 @@ def _fair(look: Look, trial: Trial) -> Trial:
 
 
 def _missed(look: Look, trial: Trial) -> bool:
-    """Whether more is left without a trial, about where it ends: a change of numbers alone.
+    """Whether more is left without a trial, about where it ends.
 
-    Far along a curved valley an amount's std says little of how clear of none it lies.
+    Far along a curved valley an amount's std says little of how clear of none it lies: of a part on springs
+    little but its mass times its place shows. What changes the model bends to more than numbers do, and has
+    to beat none of it for good.
     """
     if trial.candidate.build is not None:
-        return False
+        return trial.evidence > log_evidence(look.seen) + BEATEN
     point = carried(look.here, trial.problem, trial.evaluation.point)
     try:
         without, _ = solve(look.here, point, iterations=FIRST_STEPS, tolerance=0.5)
