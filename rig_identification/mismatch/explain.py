@@ -73,7 +73,7 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
             problem, problem, fitted.evaluation, excess(fitted.evaluation), budget, screened=promises
         )
         best = named(ideal, search, notify)
-        if best is not None and best.mismatch.verdict == "explained" and not best.trace:
+        if best is not None and best.wholly:
             return best
     return undecided(ideal, problem, fitted.evaluation, promises, count, notify, budget)
 

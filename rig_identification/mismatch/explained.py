@@ -30,6 +30,16 @@ class Explained:
     trace: bool = False  # whether something is left at all, be it next to nothing
     bodies: Bodies = ()  # what rivals make of the body
 
+    @property
+    def told(self) -> bool:
+        """Whether it explains the session, but for a trace perhaps."""
+        return self.mismatch.verdict == "explained"
+
+    @property
+    def wholly(self) -> bool:
+        """Whether it does, and every residual is noise."""
+        return self.told and not self.trace
+
 
 def only_a_trace(ideal: Fitted, fitted: Fitted, square: float = TRACE_SQUARE) -> bool:
     """Whether what ``fitted`` leaves is next to nothing beside what the ``ideal`` model leaves.

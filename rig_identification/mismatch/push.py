@@ -129,7 +129,7 @@ def push_too(ideal: Ideal, before: Search, tried: Trials, search: Search, notify
     )
     its = replace(search, problem=outside_of_it)
     found = whole_runs(ideal, its)
-    if found.mismatch.verdict != "explained" or found.trace:
+    if not found.wholly:
         return None
     # What it was chosen from was heard with the push among the residuals
     found, _ = likeliest_whole(

@@ -59,7 +59,7 @@ def likeliest_whole(
         + sum(densities[key] for key in followed)
         for (trial, found, _), densities in zip(heard, held, strict=True)
     }
-    convincing = [h for h in heard if h[1].mismatch.verdict == "explained" and not h[1].trace]
+    convincing = [h for h in heard if h[1].wholly]
     chosen, best, search = max(convincing, key=lambda h: said[id(h[0])])
     gaps = [
         (max(0.0, said[id(chosen)] - said[id(t)]), as_fitted(found.fitted, t))

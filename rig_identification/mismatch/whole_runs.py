@@ -96,7 +96,7 @@ def pruned(best: Explained, search: Search, count: int) -> Explained:
                 return best
             less = [t for k, t in enumerate(kept) if k != i]
             again = _fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
-            if again.mismatch.verdict == "explained" and (best.trace or not again.trace):
+            if again.told and (best.trace or not again.trace):
                 # What leaves a trace that both together do not leave lacks something
                 best, kept = again, less
                 break
