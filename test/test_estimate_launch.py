@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from test_simulate_identify import shaken
 
+from rig_identification.estimate.first_guess import elements_that_hang, first_elements, rest_of
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session, pose_problem
 from rig_identification.estimate.launch import Launch
@@ -16,6 +17,7 @@ from rig_identification.mismatch.riders import Swing, rider_candidate
 from rig_identification.mismatch.screen import extended
 from rig_identification.mismatch.supports import cable_elasticity
 from rig_identification.model.equilibrium import find_rest
+from rig_identification.model.motion import rig_model
 from rig_identification.recording import Dummy, Session
 from rig_identification.rig import Cable, Mount, Rig
 from rig_identification.simulate import (
@@ -123,3 +125,44 @@ def test_a_run_is_launched_with_a_liquid_on_cables_that_stretch() -> None:
     assert len(followed) == 1
     assert lost == ()
     assert float(np.mean(outcomes[0].residual ** 2)) < 1.1
+
+
+#: Ceiling points, hinges (m) and lengths of a rig whose cables splay and differ by half a metre.
+SPLAYED = (
+    ([0.151, -0.030, -0.011], [0.002, -0.021, -0.012], 1.6313),
+    ([3.321, -0.022, -0.005], [1.489, 0.019, 0.008], 1.9173),
+    ([0.172, 5.026, 0.006], [-0.004, 2.509, -0.019], 1.9510),
+    ([3.338, 5.020, -0.005], [1.493, 2.484, 0.011], 2.1909),
+)
+
+
+def test_a_guess_with_which_a_cable_would_push_is_mended_by_how_the_body_hangs() -> None:
+    spec = shaken(12)
+    cables = tuple(
+        replace(c, ceiling_point=np.array(a), body_point=np.array(b), length=length)
+        for c, (a, b, length) in zip(spec.rig.cables, SPLAYED, strict=True)
+    )
+    body = np.array([989.0, 0.685, 1.030, -1.183, 876.0, -1.8, 3.7, 245.0, 11.1, 1033.0])
+    dummy = Dummy(45.0, np.array([0.95, 0.77, -0.25]))
+    statics = (StaticSpec("bare", 4.0), StaticSpec("loaded", 4.0, dummy))
+    pull = Pulled(np.array([80.0, 60.0, 0.0]), body[1:4])
+    runs = (RunSpec("run_1", 6.0, pull, UnbalancedMass(1.0, 1.61, ramp=2.0)),)
+    rig = replace(spec.rig, cables=cables, mass=989.0)
+    hung = replace(spec, rig=rig, elements=body, statics=statics, runs=runs)
+    session, truth = simulate_session(hung, np.random.default_rng(2))
+    assert min(truth.least_tension.values()) > 0.0
+
+    def tensions(elements: np.ndarray) -> np.ndarray:
+        model = rig_model(session.rig, elements)
+        return find_rest(model, rest_of(model)).tension
+
+    assert np.min(tensions(first_elements(session))) < 0.0
+    guess = elements_that_hang(session)
+    assert np.min(tensions(guess)) > 0.0
+    np.testing.assert_allclose(guess[1:4], body[1:4], atol=0.1)
+    assert misfit(fit_session(session).evaluation) < 1.05
+
+
+def test_a_guess_that_hangs_stays_as_it_is() -> None:
+    session = tilted_trifilar()
+    np.testing.assert_array_equal(elements_that_hang(session), first_elements(session))

@@ -8,10 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.model import sensors
-from rig_identification.model.equilibrium import design_pose, settle
-from rig_identification.model.motion import RigModel, State, on_cables
+from rig_identification.model.equilibrium import design_pose, find_rest, settle
+from rig_identification.model.motion import RigModel, State, on_cables, rig_model
 from rig_identification.recording import Session
 from rig_identification.rig import Rig
+from rig_identification.statics import observe_static, solve_center_of_mass
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,25 @@ def first_elements(session: Session) -> Array:
     spread = (GYRATION * size) ** 2
     inertia = mass * np.array([spread[1] + spread[2], spread[0] + spread[2], spread[0] + spread[1]])
     return np.array([mass, *center, inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]])
+
+
+def elements_that_hang(session: Session) -> Array:
+    """(10,) the first elements; the centre of mass from rest where with a guessed one a cable would push.
+
+    Cables that splay and differ in length hold a body only with its centre of mass above a part of the floor.
+    With one guessed beside that it rests, if at all, in another pose, in which cables push, and no fit comes
+    back from there. How it hangs in the static recordings tells where it is (chapter 2 of the thesis).
+    """
+    elements = first_elements(session)
+    model = rig_model(session.rig, elements)
+    hung = find_rest(model, rest_of(model))
+    if hung.converged and np.all(hung.tension > 0.0):
+        return elements
+    seen = [observe_static(recording, session.rig) for recording in session.statics]
+    seen = [o for o in seen if np.all(np.isfinite([*o.inclination, *o.tension]))]
+    center = solve_center_of_mass(session.rig, *seen).center_of_mass if seen else np.full(3, np.nan)
+    elements[1:4] = np.where(np.isfinite(center), center, elements[1:4])
+    return elements
 
 
 def weak_prior(rig: Rig) -> Array:

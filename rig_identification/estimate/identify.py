@@ -12,7 +12,7 @@ from rig_identification.errors import InputError
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
-from rig_identification.estimate.first_guess import first_elements, mocap_mount, weak_prior
+from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
@@ -66,7 +66,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     Raises InputError where no recording holds a device that the description mounts.
     """
     rig = session.rig
-    elements = first_elements(session)
+    elements = elements_that_hang(session)
     model = rig_model(rig, elements)
     model = model if assumed is None else assumed(model)
     runs = tuple(away_from_jumps(part) for r in session.training for part in prepare(rig, r).where_driven())
