@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_mismatch_push_beside import moved
+from test_mismatch_push_beside import biased, moved
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import Ideal, fit_session, judged
 from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.pulse import likeliest_pulse
-from rig_identification.recording import Recording, Session
+from rig_identification.recording import Session
 from rig_identification.simulate import simulate_session
 
 PUSH, START, LASTS = 25.0, 9.0, 0.8  # N at the peak along the exciter's z; s
@@ -57,7 +57,7 @@ def test_a_gentle_push_is_found_beside_an_error_that_shows_more(
     pushed: str, bias: float, push: float
 ) -> None:
     made = _session(pushed, push)
-    found = identify(replace(made, recordings=tuple(_biased(r, bias) for r in made.recordings)))
+    found = identify(replace(made, recordings=tuple(biased(r, bias) for r in made.recordings)))
     assert found.mismatch.verdict == "explained"
     first, second = found.mismatch.findings
     assert (first.effect, first.where["channel"], first.where["axis"]) == ("imu_bias", "imu", "x")
@@ -69,13 +69,6 @@ def test_a_gentle_push_is_found_beside_an_error_that_shows_more(
     assert times["start"] == pytest.approx(START, abs=0.1)
     assert found.holdout_error is not None
     assert found.holdout_error < 1.1
-
-
-def _biased(recording: Recording, bias: float) -> Recording:
-    if recording.imu is None:
-        return recording
-    values = recording.imu.values + np.array([bias, 0.0, 0.0, 0.0, 0.0, 0.0])
-    return replace(recording, imu=replace(recording.imu, values=values))
 
 
 def test_noise_alone_holds_no_push() -> None:

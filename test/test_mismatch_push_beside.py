@@ -18,11 +18,12 @@ BIAS = 0.012  # rad/s about x, some hundred samples' noise
 PUSH, START, LASTS = 120.0, 14.0, 1.2  # N at the peak along the exciter's z; s
 
 
-def _biased(recording: Recording) -> Recording:
+def biased(recording: Recording, bias: float) -> Recording:
+    """The recording as a gyroscope with a bias (rad/s) about x would have made it."""
     if recording.imu is None:
         return recording
     values = recording.imu.values.copy()
-    values[:, 0] += BIAS
+    values[:, 0] += bias
     return replace(recording, imu=replace(recording.imu, values=values))
 
 
@@ -47,7 +48,7 @@ def session() -> Session:
     other = replace(run, name="run_2", holdout=True, duration=12.0)
     made = simulate_session(replace(spec, runs=(run, other)), np.random.default_rng(8))[0]
     recordings = tuple(
-        _biased(moved(r, PUSH, START, LASTS) if r.name == "run_1" else r) for r in made.recordings
+        biased(moved(r, PUSH, START, LASTS) if r.name == "run_1" else r, BIAS) for r in made.recordings
     )
     return replace(made, recordings=recordings)
 

@@ -112,7 +112,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         partial(_beside_pulse, ideal, notify=notify, budget=budget),
     )
     best = named(ideal, search, notify, pushes, law_of_pieces(ideal, fresh, notify))
-    if best is not None and best.mismatch.verdict == "explained":
+    if best is not None and best.told:
         return best
     if near:
         law = None
@@ -155,7 +155,7 @@ def _beside_push(
     if event is None:
         return None
     found = _explain(outside(ideal, event.recording, event.start, event.end, notify), notify, budget)
-    if found is None or found.mismatch.verdict != "explained":
+    if found is None or not found.told:
         return None
     return with_push(found, ideal, here, event)
 

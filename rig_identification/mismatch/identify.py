@@ -122,7 +122,7 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
             session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies
         )
         return stated, fitted
-    careful = None if found.mismatch.verdict == "explained" else found.ideal.careful
+    careful = None if found.told else found.ideal.careful
     answer = compose(
         session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
     )

@@ -73,7 +73,7 @@ def lawful(
         return None
     notify("search: whole runs with the law", 0.8)
     best = whole_runs(ideal, own)
-    if best.mismatch.verdict != "explained":
+    if not best.told:
         return None
     if best.trace and (instead is None or not instead[1].trace):
         # A name of the catalogue may leave a trace; what has no name has nothing else to speak for it

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
@@ -23,6 +24,7 @@ from rig_identification.mismatch.whole_rivals import likeliest_whole
 from rig_identification.mismatch.whole_runs import whole_runs
 from rig_identification.result import Finding, Mismatch
 
+Array = NDArray[np.float64]
 Notify = Callable[[str, float], None]
 
 #: How uneven pieces must be (worst over median mean square) for an event to be looked for.
@@ -56,8 +58,7 @@ def without_push(
 
     problem: whole runs. here, evaluation: their short pieces, fitted. pulse: the likeliest push of all runs.
     """
-    squares = [float(np.mean(run.residual**2)) for run in evaluation.runs]
-    if max(squares) < UNEVEN * float(np.median(squares)) and np.median(squares) > CALM:
+    if not _may_hold_an_event(evaluation):
         return None
     notify("search: a push", 0.05)
     event = find_event(here, evaluation)
@@ -90,6 +91,21 @@ def without_push(
     return Explained(fitted, Mismatch("explained", text, (replace(push, evidence=evidence),), ()), ideal)
 
 
+def _squares(evaluation: Evaluation) -> Array:
+    """Mean square of what is left in each piece."""
+    return np.array([float(np.mean(run.residual**2)) for run in evaluation.runs])
+
+
+def _uneven(squares: Array) -> bool:
+    return bool(np.max(squares) >= UNEVEN * np.median(squares))
+
+
+def _may_hold_an_event(evaluation: Evaluation) -> bool:
+    """Whether one piece stands out, or the most are noise, so that a faint one may."""
+    squares = _squares(evaluation)
+    return _uneven(squares) or bool(np.median(squares) <= CALM)
+
+
 def _gentle(push: Finding, event: Event) -> Finding:
     """A push too gentle for its moment and direction to be told: the pieces that it disturbs are left out."""
     times = [{"recording": event.recording, "start": round(event.start, 3), "end": round(event.end, 3)}]
@@ -104,8 +120,7 @@ def _gentle(push: Finding, event: Event) -> Finding:
 
 def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event | None:
     """A push beside something else that is wrong all the time."""
-    squares = [float(np.mean(run.residual**2)) for run in evaluation.runs]
-    if max(squares) < UNEVEN * float(np.median(squares)):
+    if not _uneven(_squares(evaluation)):
         return None
     notify("search: a push beside something else", 0.06)
     return find_event(here, evaluation, alone=False)
@@ -117,8 +132,7 @@ def push_too(ideal: Ideal, before: Search, tried: Trials, search: Search, notify
     With the effects in the model all other pieces are noise, and so is all of every run outside the push.
     before: where the search stood before the last of them; tried: what that was chosen from.
     """
-    squares = [float(np.mean(run.residual**2)) for run in search.evaluation.runs]
-    if max(squares) < UNEVEN * float(np.median(squares)) and np.median(squares) > CALM:
+    if not _may_hold_an_event(search.evaluation):
         return None
     notify("search: a push beside " + ", ".join(t.candidate.label for t in search.found), 0.6)
     event = find_event(search.here, search.evaluation)
@@ -227,7 +241,7 @@ def with_pulse(
         return None
     whole, undisturbed = _everything(found, ideal)
     if undisturbed:
-        return replace(found, fitted=whole) if found.mismatch.verdict == "explained" else None
+        return replace(found, fitted=whole) if found.told else None
     pulse = _pulse_within(whole, pulse.recording, pulse.start, pulse.end) or pulse
     after = judged(found.fitted)[0].holdout
     evidence = evidence_of(ideal, found.fitted, after) | {"log_likelihood_gain": pulse.gain}
