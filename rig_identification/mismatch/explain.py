@@ -9,6 +9,7 @@ from functools import partial
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.disagreeing import where_runs_disagree
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
 from rig_identification.mismatch.lawful import law_of_pieces, lawful_instead
@@ -115,6 +116,9 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     if best is not None and best.told:
         return best
     if near:
+        agreed = where_runs_disagree(ideal, notify, budget)
+        if agreed is not None:
+            return agreed
         law = None
         if not budget.spent():
             notify("search: a force that follows one point's motion", 0.7)

@@ -6,8 +6,9 @@ not take it all away.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
@@ -208,11 +209,13 @@ def leading(
     budget: Budget,
     finish: Callable[[Trial], Trial | None],
     refused: int = 0,
+    asked: Sequence[Promise] = (),
 ) -> tuple[Trial, Trial] | None:
     """The hypothesis with which, and with one more, nothing is left, and that one; None where there is none.
 
     left: without any of them, nats. finish: fits a trial to its end; None where its sign makes no sense.
-    refused: so many of the first that were tried were asked before, and are not.
+    refused: so many of the first that were tried were asked before, and are not. asked: promises of what rest
+    asks for most, which first order may say little of.
 
     Of two effects at once the one that takes most away alone may be neither: what bends to both does. What
     is left with either of the two shows the other one plainly.
@@ -237,13 +240,9 @@ def leading(
         others = compatible(candidates, [first.candidate])
         promises = screen(first.problem, first.evaluation, others, mass)
         chiefly = excess(first.evaluation) < ALMOST * left
-        for k, promise in enumerate(worth_a_fit(promises, count_of(others))[:FURTHER]):
-            if promise.candidate.build is not None:
-                # Fitted slowly, and promises less than it keeps: the best one, beside what is chief
-                if k > 0 or not chiefly or promise.share < CHIEF or budget.spent():
-                    continue
-            elif promise.share < DIRECT:
-                continue
+        possible = {c.label for c in others}
+        resting = (p for p in asked if p.candidate.label in possible)
+        for promise in chain(resting, _further(promises, count_of(others), chiefly, budget)):
             second = leaving_nothing(first, promise, budget)
             if second is None:
                 continue
@@ -251,3 +250,14 @@ def leading(
                 best = first, second
             break
     return best
+
+
+def _further(promises: list[Promise], count: int, chiefly: bool, budget: Budget) -> Iterator[Promise]:
+    """Promises of what is tried on top of another hypothesis. chiefly: that leaves next to nothing."""
+    for k, promise in enumerate(worth_a_fit(promises, count)[:FURTHER]):
+        if promise.candidate.build is not None:
+            # Fitted slowly, and promises less than it keeps: the best one, beside what is chief
+            if k == 0 and chiefly and promise.share >= CHIEF and not budget.spent():
+                yield promise
+        elif promise.share >= DIRECT:
+            yield promise

@@ -83,6 +83,7 @@ class Look:
     certain: list[Trial] = field(default_factory=list)  # what rest asks for, beside something that moves
     beside: dict[str, list[Trial]] = field(default_factory=dict)  # that something else, by label
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
+    asked: list[Promise] = field(default_factory=list)  # by rest, most of all
     moving: bool = False  # whether rest asks for next to nothing, and no change of numbers promises much
     rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
@@ -209,6 +210,9 @@ class Look:
         self.notify("what rest asks for")
         asked = at_rest(self.here, self.seen, self.candidates, self.budget, self.promises)[:MOST]
         most = max((a.promise.gain for a in asked), default=0.0)
+        # A few nats that rest asks for are no reason for so much motion
+        asked = asked if most > BEATEN else []
+        self.asked = [a.promise for a in asked if most - a.promise.gain < BEATEN]
         for found in asked:
             behind = most - found.promise.gain
             if self.budget.spent() or (self.at_noise and behind > BEATEN):
@@ -328,6 +332,7 @@ class Look:
             self.budget,
             self.finished,
             self.refused,
+            self.asked,
         )
         self.refused = len(self.tried)
         if found is None:
