@@ -30,7 +30,7 @@ Notify = Callable[[str, float], None]
 
 
 def where_runs_disagree(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
-    """What explains all runs where the fitted ones are noise and held-out ones contradict; None: nothing does.
+    """What explains all runs where fitted ones are noise and held-out ones contradict; None: nothing does.
 
     ideal: the ideal model, whose fit nothing that was looked for in the fitted runs alone explains.
     """
@@ -86,7 +86,7 @@ def _told(found: Explained, fitted: Fitted) -> Explained:
     """The explanation, and what chose it."""
     held = ", ".join(run.recording.name for run in fitted.holdout_runs)
     text = (
-        f"{found.mismatch.explanation} The fitted runs alone are noise without it; that {held} asked for other "
-        "parameters chose it, and fitted none of its numbers."
+        f"{found.mismatch.explanation} The fitted runs alone are noise without it; that {held} asked for "
+        "other parameters chose it, and fitted none of its numbers."
     )
     return replace(found, mismatch=replace(found.mismatch, explanation=text))

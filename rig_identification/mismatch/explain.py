@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
@@ -14,11 +14,14 @@ from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
 from rig_identification.mismatch.lawful import law_of_pieces, lawful_instead
 from rig_identification.mismatch.left_over import unexplained
+from rig_identification.mismatch.locate import calm_pieces
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse
 from rig_identification.mismatch.push import (
+    Calmed,
     Pushes,
     chiefly,
+    nothing_known,
     outside,
     outside_of_pulse,
     push_beside,
@@ -100,12 +103,12 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     search = Search(problem, here, evaluation, excess(evaluation), budget)
     if search.whole:
         search.screened = promises
-    pushed = None if search.whole else without_push(ideal, problem, here, evaluation, pulse, notify)
-    if pushed is not None:
-        return pushed
-    beside = None if search.whole else _beside_push(ideal, here, evaluation, notify, budget)
-    if beside is not None:
-        return beside
+    if not search.whole:
+        calm = cache(partial(calm_pieces, here, evaluation))
+        pushed = without_push(ideal, problem, here, evaluation, pulse, notify, calm)
+        pushed = pushed or _beside_push(ideal, here, evaluation, notify, budget, calm)
+        if pushed is not None:
+            return pushed
     near = search.whole
     fresh = replace(search, found=[], rivals=[])
     pushes = Pushes(
@@ -152,10 +155,15 @@ def _gentle_push(ideal: Ideal, problem: Problem, pulse: Pulse | None, notify: No
 
 
 def _beside_push(
-    ideal: Ideal, here: Problem, evaluation: Evaluation, notify: Notify, budget: Budget
+    ideal: Ideal,
+    here: Problem,
+    evaluation: Evaluation,
+    notify: Notify,
+    budget: Budget,
+    calm: Calmed = nothing_known,
 ) -> Explained | None:
     """What explains the session outside a push; None where nothing pushes, or nothing explains the rest."""
-    event = push_beside(here, evaluation, notify)
+    event = push_beside(here, evaluation, notify, calm)
     if event is None:
         return None
     found = _explain(outside(ideal, event.recording, event.start, event.end, notify), notify, budget)

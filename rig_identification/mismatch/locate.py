@@ -142,22 +142,39 @@ EVENT_CONTRAST = 3.0
 CALM = 1.15
 
 
-def find_event(problem: Problem, evaluation: Evaluation, alone: bool = True) -> Event | None:
-    """Pieces that cannot be fitted, next to each other in one run; None where there are no such.
+@dataclass(frozen=True)
+class Calm:
+    """The pieces that fit best, fitted without the others."""
 
-    alone: all other pieces are explained. Otherwise something else is wrong in these, alike in all of
-    them, before the event and after it.
-    """
+    keep: tuple[int, ...]
+    fitted: Evaluation
+
+
+def calm_pieces(problem: Problem, evaluation: Evaluation) -> Calm | None:
+    """Those of a problem's pieces that an event would leave in peace; None where there are too few."""
     count = len(problem.runs)
     if count < 4:
         return None
     order = np.argsort([float(np.mean(run.residual**2)) for run in evaluation.runs])
     keep = sorted(int(i) for i in order[: count - int(EVENT_SHARE * count)])
-    calm_problem = replace(problem, runs=tuple(problem.runs[i] for i in keep))
-    calm_point = replace(evaluation.point, starts=tuple(evaluation.point.starts[i] for i in keep), latents=())
-    fitted, _ = solve(calm_problem, calm_point, iterations=10, tolerance=0.5)
-    if alone and misfit(fitted) > CALM:
+    part = replace(problem, runs=tuple(problem.runs[i] for i in keep))
+    point = replace(evaluation.point, starts=tuple(evaluation.point.starts[i] for i in keep), latents=())
+    fitted, _ = solve(part, point, iterations=10, tolerance=0.5)
+    return Calm(tuple(keep), fitted)
+
+
+def find_event(
+    problem: Problem, evaluation: Evaluation, alone: bool = True, calm: Calm | None = None
+) -> Event | None:
+    """Pieces that cannot be fitted, next to each other in one run; None where there are no such.
+
+    alone: all other pieces are explained. Otherwise something else is wrong in these, alike in all of
+    them, before the event and after it. calm: the :func:`calm_pieces`, where they are known.
+    """
+    calm = calm or calm_pieces(problem, evaluation)
+    if calm is None or (alone and misfit(calm.fitted) > CALM):
         return None
+    count, keep, fitted = len(problem.runs), list(calm.keep), calm.fitted
     starts = list(evaluation.point.starts)
     for i, start in zip(keep, fitted.point.starts, strict=True):
         starts[i] = start
@@ -178,8 +195,8 @@ def find_event(problem: Problem, evaluation: Evaluation, alone: bool = True) -> 
     if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
         return None
     first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
-    calm = tuple(i for i in range(count) if i not in bad)
-    event = Event(names.pop(), first.offset, last.offset + last.grid.duration, point, calm)
+    peaceful = tuple(i for i in range(count) if i not in bad)
+    event = Event(names.pop(), first.offset, last.offset + last.grid.duration, point, peaceful)
     return None if not alone and at_an_end(event, problem) else event
 
 

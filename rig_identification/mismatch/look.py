@@ -5,6 +5,7 @@ Which is asked after which search.py says, and what is told of it telling.py.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -177,6 +178,26 @@ class Look:
             worthy += as_likely(self.promises, worthy, MEANT)
         self.begin(worthy)
 
+    def as_measured(
+        self, told: Callable[[list[Candidate]], list[Promise]], guess: NDArray[np.float64] | None
+    ) -> None:
+        """What the motion that was measured promises most of, in a rig as it is described."""
+        self.notify("along the motion that was measured")
+        promises = told(self.candidates)
+        most = max((p.gain for p in promises), default=0.0)
+        if most < BEATEN:
+            return
+        starts = self._unbent(guess)
+        for promise in promises:
+            if self.budget.spent() or promise.gain < CLOSE * most:
+                break
+            if promise.candidate.slow and self.enough:
+                continue
+            self.notify(promise.candidate.label)
+            trial, _ = best_of(self.here, starts, promise, self.budget)
+            if trial is not None:
+                self.tried.append(trial)
+
     def outright(self) -> None:
         """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.
 
@@ -297,10 +318,8 @@ class Look:
     def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
         self.notify("from where nothing is bent")
-        about = unbent(self.here, self.seen)
-        first = None if guess is None else at_first(self.here, self.seen, guess)
-        starts = [e for e in (about, first) if e is not None]
-        again = [] if about is None else screen(self.here, about, self.candidates, self.mass)
+        starts = self._unbent(guess)
+        again = [] if self._about is None else screen(self.here, self._about, self.candidates, self.mass)
         known: set[str] = set()
         for promise in likely(self.promises, again):
             label = promise.candidate.label
@@ -314,6 +333,16 @@ class Look:
                 self.tried.append(trial)
             if alike:
                 known.add(label)
+
+    @cached_property
+    def _about(self) -> Evaluation | None:
+        """About the same body in a rig as it is described."""
+        return unbent(self.here, self.seen)
+
+    def _unbent(self, guess: NDArray[np.float64] | None) -> list[Evaluation]:
+        """Where nothing is bent. guess: where the ideal model's fit began."""
+        first = None if guess is None else at_first(self.here, self.seen, guess)
+        return [e for e in (self._about, first) if e is not None]
 
     def _decided(self, trial: Trial) -> bool:
         """Whether starting a hypothesis from what the other screening promised of it is of no use."""

@@ -80,6 +80,22 @@ def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Eval
     return found
 
 
+def driven(problem: Problem, point: Point, mass: float) -> tuple[Problem, Evaluation] | None:
+    """The problem with a random wrench about as strong as what the model lacks, about the measured motion.
+
+    None where a run cannot be followed, or no wrench on the body leaves only noise. Quicker than
+    :func:`measured`, whose wrench is the weakest.
+    """
+    there = fitting_wrench(problem, point, mass)
+    found = None if there is None else evaluate(*there)
+    if there is None or found is None:
+        return None
+    for _ in range(ROUNDS):
+        moved = _smoothed(there[0], found) if misfit(found) > ENOUGH else None
+        found = found if moved is None else moved
+    return None if misfit(found) > ENOUGH else (there[0], found)
+
+
 def _smoothed(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
     """About the motion to which the smoother brings that of ``evaluation``, whatever it gains."""
     model = model_at(problem.bench.parameters, evaluation.point.theta)

@@ -9,6 +9,7 @@ from functools import partial
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem, excess
+from rig_identification.mismatch.along_measured import along_measured
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
@@ -102,6 +103,7 @@ class _Naming:
                 more=not self.last,
                 law=self.law if first else None,
                 guess=None if guess is None else guess.theta,
+                measured=partial(along_measured, self.ideal) if first else None,
             )
             if known is not None and not any(map(at_noise, tried.done)):
                 # Time ran out before it was come to again

@@ -14,7 +14,7 @@ from rig_identification.estimate.identify import Ideal, fit_again, judged
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
-from rig_identification.mismatch.locate import CALM, Event, at_an_end, find_event
+from rig_identification.mismatch.locate import CALM, Calm, Event, at_an_end, find_event
 from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse, pulse_finding
 from rig_identification.mismatch.standing import Search
@@ -26,6 +26,8 @@ from rig_identification.result import Finding, Mismatch
 
 Array = NDArray[np.float64]
 Notify = Callable[[str, float], None]
+#: The pieces that an event leaves in peace, fitted when they are first asked for.
+Calmed = Callable[[], Calm | None]
 
 #: How uneven pieces must be (worst over median mean square) for an event to be looked for.
 UNEVEN = 4.0
@@ -36,6 +38,10 @@ OUTSIDE = 0.5
 #: Share of what is wrong with something in the model that a push has to take away, to first order, for the
 #: rest to be looked at without it.
 SEEN = 0.25
+
+
+def nothing_known() -> None:
+    """No piece is known to be calm."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +59,17 @@ def without_push(
     evaluation: Evaluation,
     pulse: Pulse | None,
     notify: Notify,
+    calm: Calmed = nothing_known,
 ) -> Explained | None:
     """The session without the seconds in which something pushed; None where nothing did, or more is wrong.
 
     problem: whole runs. here, evaluation: their short pieces, fitted. pulse: the likeliest push of all runs.
+    calm: what is known of the pieces that a push leaves in peace.
     """
     if not _may_hold_an_event(evaluation):
         return None
     notify("search: a push", 0.05)
-    event = find_event(here, evaluation)
+    event = find_event(here, evaluation, calm=calm())
     if event is None:
         return None
     seen = pulse is not None and pulse.within(event.recording, event.start, event.end)
@@ -118,12 +126,14 @@ def _gentle(push: Finding, event: Event) -> Finding:
     return replace(push, where=where, statement=text)
 
 
-def push_beside(here: Problem, evaluation: Evaluation, notify: Notify) -> Event | None:
-    """A push beside something else that is wrong all the time."""
+def push_beside(
+    here: Problem, evaluation: Evaluation, notify: Notify, calm: Calmed = nothing_known
+) -> Event | None:
+    """A push beside something else that is wrong all the time. calm: as :func:`without_push` has it."""
     if not _uneven(_squares(evaluation)):
         return None
     notify("search: a push beside something else", 0.06)
-    return find_event(here, evaluation, alone=False)
+    return find_event(here, evaluation, alone=False, calm=calm())
 
 
 def push_too(ideal: Ideal, before: Search, tried: Trials, search: Search, notify: Notify) -> Explained | None:

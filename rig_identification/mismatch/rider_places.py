@@ -97,19 +97,24 @@ def finer(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden
     best: Ridden | None = None
     for factors in (COARSE, FINE):
         center = swing if best is None else best.swing
-        for factor in factors:
-            tried = replace(center, frequency=center.frequency * factor)
-            found = _best_damping(problem, beyond, tried, mass)
-            if found is not None and (best is None or found.best.gain > best.best.gain):
+        for found in _around(problem, beyond, center, factors, mass):
+            if best is None or found.best.gain > best.best.gain:
                 best = found
     return best
 
 
-def _best_damping(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden | None:
-    responses = _responses(problem, beyond, swing.directions, (swing.frequency,), DAMPINGS)
+def _around(
+    problem: Problem, beyond: Beyond, center: Swing, factors: Sequence[float], mass: float
+) -> Iterator[Ridden]:
+    """Swings at ``factors`` of a frequency, damped in every way: all at once, which reads a Jacobian once."""
+    frequencies = [center.frequency * factor for factor in factors]
+    responses = _responses(problem, beyond, center.directions, frequencies, DAMPINGS)
     found = beyond.of(responses)
-    tried = [_ridden(swing, d, k, found, responses, mass) for k, d in enumerate(DAMPINGS)]
-    return max((r for r in tried if r is not None), key=lambda r: r.best.gain, default=None)
+    for k, (frequency, damping) in enumerate(product(frequencies, DAMPINGS)):
+        tried = replace(center, frequency=frequency)
+        ridden = _ridden(tried, damping, k, found, responses, mass)
+        if ridden is not None:
+            yield ridden
 
 
 def spread_of(problem: Problem) -> float:

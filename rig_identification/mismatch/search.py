@@ -8,6 +8,7 @@ whole runs are fitted with it, and if something is left the search goes on from 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +63,7 @@ def trials(
     more: bool = False,
     law: Law | None = None,
     guess: NDArray[np.float64] | None = None,
+    measured: Callable[[list[Candidate]], list[Promise]] | None = None,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
@@ -72,7 +74,7 @@ def trials(
     Where the budget is spent nothing more that changes the model is begun. screened: promises about this
     evaluation, where they are known. more: another effect may be added after. law: what may explain all
     where nothing that first order tells of does. guess: the problem's parameters where the ideal model's
-    fit began, as long as nothing else is in the model.
+    fit began, as long as nothing else is in the model. measured: promises about the motion that was measured.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
@@ -90,9 +92,13 @@ def trials(
         look.fitted = led.instead or led.first
     lead = None
     if misfit(seen) > VERY_FAR:
-        look.outright()
-        # What takes nearly all away is asked at once whether with one more it leaves nothing
-        lead = look.leading() if more and look.almost else None
+        if measured is not None:
+            look.as_measured(measured, guess)
+            lead = look.leading() if more and look.almost else None
+        if lead is None and not look.enough:
+            look.outright()
+            # What takes nearly all away is asked at once whether with one more it leaves nothing
+            lead = look.leading() if more and look.almost else None
         if lead is None and not look.enough:
             look.at_rest()
             if more and look.certain:
