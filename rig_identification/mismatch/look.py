@@ -188,8 +188,9 @@ class Look:
         if most < BEATEN:
             return
         starts = self._unbent(guess)
-        for promise in promises:
-            if self.budget.spent() or promise.gain < CLOSE * most:
+        likely = [p for p in promises if p.gain > CLOSE * most]
+        for promise in likely:
+            if self.budget.spent():
                 break
             if promise.candidate.slow and self.enough:
                 continue
@@ -197,6 +198,9 @@ class Look:
             trial, _ = best_of(self.here, starts, promise, self.budget)
             if trial is not None:
                 self.tried.append(trial)
+                if len(likely) == 1:
+                    # So sharply told it is worth its last steps, wherever the first ones led
+                    self.finished(trial)
 
     def outright(self) -> None:
         """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.

@@ -190,7 +190,8 @@ class _Naming:
         if asked:
             self.lawful = partial(lawful_instead, self.ideal, before, self.notify, first)
             explained = best if best.told else None
-            if explained is None or first.candidate.many:
+            # What leaves a trace of a few numbers beside something else is asked for that first
+            if first.candidate.many or not (best.told or near_noise(best.fitted)):
                 ruled = self._ruled(partial(self.lawful, explained))
                 self.lawful = None
                 if ruled is not None:
@@ -250,11 +251,18 @@ class _Naming:
         told = self.fallback or self.best
         if told is not None and told.told:
             # What leaves a trace may stand in for a law, which is asked where no second effect is that trace
-            return (self._ruled(self.lawful) if self.lawful is not None else None) or told
+            return self._ruled_instead() or told
+        ruled = self._ruled_instead()
+        if ruled is not None:
+            return ruled
         if self.pushes is not None and self.uneven is not None and not self.search.budget.spent():
             # All is fitted anew outside of what stands out: only where one more effect does not explain it
             return self.pushes.in_pieces(*self.uneven) or told
         return told
+
+    def _ruled_instead(self) -> Explained | None:
+        """The law that explains it all instead, where it was not asked yet."""
+        return None if self.lawful is None else self._ruled(self.lawful)
 
     def _ruled(self, asked: Callable[[], Explained | None]) -> Explained | None:
         """The law that explains it all instead, if one does."""
