@@ -9,6 +9,9 @@ would do so, and this says nothing.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.solve import shortened
 from rig_identification.mismatch.candidate import Candidate
@@ -21,9 +24,28 @@ ENOUGH = 12.0
 
 
 def along_measured(ideal: Ideal, candidates: list[Candidate]) -> list[Promise]:
-    """Promises about the measured motion, best first; none where no wrench explains what was measured."""
+    """Promises of forces about the measured motion, best first; none where no wrench explains that motion."""
     fitted = ideal.fitted
     problem = shortened(with_reference(fitted.problem, fitted.rest), ENOUGH)
+    point = fitted.evaluation.point
+    if ideal.pieces is not None and ideal.careful is not None:
+        # Whole runs bend the body by far more than short pieces do, and the wrench has that to make up for
+        there = ideal.careful[1].point
+        begun = dict(zip(map(_begins, ideal.pieces.runs), there.starts, strict=True))
+        if all(_begins(run) in begun for run in problem.runs):
+            starts = tuple(begun[_begins(run)] for run in problem.runs)
+            point = replace(point, theta=there.theta, starts=starts)
     mass = mass_of(problem, fitted.evaluation)
-    seen = driven(problem, fitted.evaluation.point, mass)
-    return [] if seen is None else screen(*seen, candidates, mass)
+    seen = driven(problem, point, mass)
+    # What the ideal model bent to swallow the force would promise much of being bent back
+    return [] if seen is None else screen(*seen, [c for c in candidates if _acts(c)], mass)
+
+
+def _begins(run: Run) -> tuple[str, float]:
+    """Where a run or a piece of one begins: its recording, and s into that."""
+    return run.recording.name, run.offset
+
+
+def _acts(candidate: Candidate) -> bool:
+    """Whether a hypothesis is a force, and no number of rig or devices that the lab doubts."""
+    return not candidate.doubted and all(p.kind == "physics" for p in candidate.parameters)

@@ -53,6 +53,8 @@ HORIZONS = (0.4, 1.2)
 #: Mean square of the residuals above which so much is left that what leaves nothing of it is no chance, and
 #: the share of it that is still left over the first horizons by what rings or swings and is not there.
 VERY_FAR, LARGER = 5.0, 0.5
+#: Mean square of all pieces' residuals with what was fitted to a few of them, below which they agree to it.
+AGREED = 1.05
 #: Std of its prior that a fit starts away from at most.
 FARTHEST = 3.0
 
@@ -122,7 +124,12 @@ def adopted(
         known.get((run.recording.name, run.offset)) or _begun(wide, run, point, start)
         for run, start in zip(wide.runs, point.starts, strict=True)
     )
-    fitted, _ = solve(wide, replace(point, starts=starts), iterations=6, tolerance=0.5)
+    point = replace(point, starts=starts)
+    there = evaluate(wide, point)
+    if there is not None and misfit(there) < AGREED:
+        # Pieces that it was not fitted to agree: whole runs are next, and fitting these all tells no more
+        return wide, there
+    fitted, _ = solve(wide, point, iterations=6, tolerance=0.5)
     return wide, fitted
 
 
