@@ -48,6 +48,7 @@ from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
     FIRST_STEPS,
     Trial,
+    attempt,
     finished,
     fitted_from,
     log_evidence,
@@ -187,20 +188,17 @@ class Look:
         most = max((p.gain for p in promises), default=0.0)
         if most < BEATEN:
             return
-        starts = self._unbent(guess)
-        likely = [p for p in promises if p.gain > CLOSE * most]
-        for promise in likely:
-            if self.budget.spent():
-                break
-            if promise.candidate.slow and self.enough:
+        for promise in (p for p in promises if p.gain > CLOSE * most):
+            if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
             self.notify(promise.candidate.label)
-            trial, _ = best_of(self.here, starts, promise, self.budget)
-            if trial is not None:
-                self.tried.append(trial)
-                if len(likely) == 1:
-                    # So sharply told it is worth its last steps, wherever the first ones led
-                    self.finished(trial)
+            # Where the ideal model's fit began nothing is bent, and the body is no worse than a guess
+            for start in reversed(self._unbent(guess)):
+                trial = attempt(self.here, start, promise, self.budget, growing=True)
+                if trial is not None:
+                    self.tried.append(trial)
+                    if at_noise(trial) or almost(trial, self.seen):
+                        break
 
     def outright(self) -> None:
         """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.
