@@ -5,12 +5,8 @@ Which is asked after which search.py says, and what is told of it telling.py.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-
-import numpy as np
-from numpy.typing import NDArray
 
 from rig_identification.estimate.solve import (
     POLISH,
@@ -41,7 +37,7 @@ from rig_identification.mismatch.first_fits import (
 )
 from rig_identification.mismatch.hypotheses import as_likely, compatible, count_of, worth_a_fit
 from rig_identification.mismatch.locate import find_liar
-from rig_identification.mismatch.outcome import MEANT, Law
+from rig_identification.mismatch.outcome import MEANT, NOTHING, Alone
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.simpler import fitted_simpler
 from rig_identification.mismatch.supports import gives_way
@@ -77,7 +73,7 @@ class Look:
     far: bool  # whether much is left
     notify: Notify
     budget: Budget
-    law: Law | None
+    alone: Alone = NOTHING
     fitted: Trial | None = None  # before, to ``here`` about ``seen``
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
@@ -179,12 +175,12 @@ class Look:
             worthy += as_likely(self.promises, worthy, MEANT)
         self.begin(worthy)
 
-    def as_measured(
-        self, told: Callable[[list[Candidate]], list[Promise]], guess: NDArray[np.float64] | None
-    ) -> None:
+    def as_measured(self) -> None:
         """What the motion that was measured promises most of, in a rig as it is described."""
+        if self.alone.measured is None:
+            return
         self.notify("along the motion that was measured")
-        promises = told(self.candidates)
+        promises = self.alone.measured(self.candidates)
         most = max((p.gain for p in promises), default=0.0)
         if most < BEATEN:
             return
@@ -193,7 +189,7 @@ class Look:
                 continue
             self.notify(promise.candidate.label)
             # Where the ideal model's fit began nothing is bent, and the body is no worse than a guess
-            for start in reversed(self._unbent(guess)):
+            for start in reversed(self._unbent):
                 trial = attempt(self.here, start, promise, self.budget, growing=True)
                 if trial is not None:
                     self.tried.append(trial)
@@ -317,10 +313,10 @@ class Look:
             self.beside[label].sort(key=lambda t: -t.evidence)
         return sorted(out.values(), key=lambda t: -t.evidence)
 
-    def from_nothing_bent(self, guess: NDArray[np.float64] | None) -> None:
+    def from_nothing_bent(self) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
         self.notify("from where nothing is bent")
-        starts = self._unbent(guess)
+        starts = self._unbent
         again = [] if self._about is None else screen(self.here, self._about, self.candidates, self.mass)
         known: set[str] = set()
         for promise in likely(self.promises, again):
@@ -341,8 +337,10 @@ class Look:
         """About the same body in a rig as it is described."""
         return unbent(self.here, self.seen)
 
-    def _unbent(self, guess: NDArray[np.float64] | None) -> list[Evaluation]:
-        """Where nothing is bent. guess: where the ideal model's fit began."""
+    @cached_property
+    def _unbent(self) -> list[Evaluation]:
+        """Where nothing is bent, and where the ideal model's fit began."""
+        guess = self.alone.guess
         first = None if guess is None else at_first(self.here, self.seen, guess)
         return [e for e in (self._about, first) if e is not None]
 
@@ -482,7 +480,7 @@ class Look:
 
     def _lawfully(self) -> bool:
         """Whether a law explains it all."""
-        if self.law is not None:
+        if self.alone.law is not None:
             self.notify("a force that follows one point's motion")
-            self.lawful = self.law(self.here, self.seen, self.needed)
+            self.lawful = self.alone.law(self.here, self.seen, self.needed)
         return self.lawful is not None

@@ -18,7 +18,7 @@ from rig_identification.mismatch.first_fits import at_noise
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of
 from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.one_more import one_more
-from rig_identification.mismatch.outcome import Law, Trials
+from rig_identification.mismatch.outcome import NOTHING, Alone, Law, Trials
 from rig_identification.mismatch.push import Pushes, push_too
 from rig_identification.mismatch.search import MOST_EFFECTS, trials
 from rig_identification.mismatch.second_choices import most_promising, second_choices
@@ -90,8 +90,6 @@ class _Naming:
         self.left = compatible(self.candidates, [t.candidate for t in search.found])
         tried = known if known is not None and (known.asked or search.budget.spent()) else None
         if tried is None:
-            first = self.step == 0
-            guess = self.ideal.fitted.guess if first else None
             tried = trials(
                 search.here,
                 search.evaluation,
@@ -101,9 +99,7 @@ class _Naming:
                 search.screened,
                 search.budget,
                 more=not self.last,
-                law=self.law if first else None,
-                guess=None if guess is None else guess.theta,
-                measured=partial(along_measured, self.ideal) if first else None,
+                alone=NOTHING if self.step else self._alone(),
             )
             if known is not None and not any(map(at_noise, tried.done)):
                 # Time ran out before it was come to again
@@ -112,6 +108,11 @@ class _Naming:
         search.screened = None
         search.liar = search.liar or tried.liar
         return tried
+
+    def _alone(self) -> Alone:
+        """What is asked as long as nothing is found."""
+        guess = self.ideal.fitted.guess
+        return Alone(self.law, None if guess is None else guess.theta, partial(along_measured, self.ideal))
 
     def _adopted(self, tried: Trials) -> Explained | None:
         """What explains the session with the first of what was tried; None: it goes on, or is over."""

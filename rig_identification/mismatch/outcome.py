@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial
 
 #: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
@@ -15,6 +20,22 @@ Law = Callable[[Problem, Evaluation, float], Explained | None]
 
 #: Log evidence that an effect has to gain.
 MEANT = 3.0
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What is known and asked only as long as nothing else is in the model."""
+
+    law: Law | None = None  # what may explain all where nothing that first order tells of does
+    guess: NDArray[np.float64] | None = (
+        None  # (p,) the problem's parameters where the ideal model's fit began
+    )
+    #: Promises of hypotheses about the motion that was measured
+    measured: Callable[[list[Candidate]], list[Promise]] | None = None
+
+
+#: Nothing is asked but what any search asks.
+NOTHING = Alone()
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,9 @@ whole runs are fitted with it, and if something is left the search goes on from 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
@@ -22,7 +20,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.first_fits import DIRECT, Notify, at_noise, shows
 from rig_identification.mismatch.hypotheses import count_of
 from rig_identification.mismatch.look import Look
-from rig_identification.mismatch.outcome import MEANT, Law, Trials
+from rig_identification.mismatch.outcome import MEANT, NOTHING, Alone, Trials
 from rig_identification.mismatch.pairs import first_of_two
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
@@ -61,9 +59,7 @@ def trials(
     screened: list[Promise] | None = None,
     budget: Budget = UNLIMITED,
     more: bool = False,
-    law: Law | None = None,
-    guess: NDArray[np.float64] | None = None,
-    measured: Callable[[list[Candidate]], list[Promise]] | None = None,
+    alone: Alone = NOTHING,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
@@ -72,9 +68,8 @@ def trials(
     is not to be trusted: witnesses are then heard one without the other, and what gives way is
     tried whatever screening says. Beside a part on springs the ceiling that rings as it does is tried.
     Where the budget is spent nothing more that changes the model is begun. screened: promises about this
-    evaluation, where they are known. more: another effect may be added after. law: what may explain all
-    where nothing that first order tells of does. guess: the problem's parameters where the ideal model's
-    fit began, as long as nothing else is in the model. measured: promises about the motion that was measured.
+    evaluation, where they are known. more: another effect may be added after. alone: what is asked as long as
+    nothing else is in the model.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
@@ -85,29 +80,16 @@ def trials(
     led = None
     if more and not far:
         led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
-    look = Look(problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, law)
+    look = Look(
+        problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, alone
+    )
     if led is not None and led.leads:
         return Trials(told_of(look, [led.first]))
     if led is not None and here is problem:
         look.fitted = led.instead or led.first
-    lead = None
-    if misfit(seen) > VERY_FAR:
-        if measured is not None:
-            look.as_measured(measured, guess)
-            lead = look.leading() if more and look.almost else None
-        if lead is None and not look.enough:
-            look.outright()
-            # What takes nearly all away is asked at once whether with one more it leaves nothing
-            lead = look.leading() if more and look.almost else None
-        if lead is None and not look.enough:
-            look.at_rest()
-            if more and look.certain:
-                return leads(look, look.certain, asked=True)
-            if look.moving:
-                look.giving_way_at_once()
-                lead = look.leading() if more and look.almost else None
-        if lead is None and not look.enough:
-            look.from_nothing_bent(guess)
+    lead, certain = _from_afar(look, more) if misfit(seen) > VERY_FAR else (None, [])
+    if certain:
+        return leads(look, certain, asked=True)
     if lead is None and more:
         lead = look.leading()
     if lead is None and not look.enough and (not far or (promises and promises[0].share > DIRECT)):
@@ -133,6 +115,30 @@ def trials(
     if found.done or far or not more or not look.passed_over():
         return found
     return ended(look)
+
+
+def _from_afar(look: Look, more: bool) -> tuple[Trial | None, list[Trial]]:
+    """What leaves nothing together with one more, and what rest is certain of, where very much is left.
+
+    Each witness is asked only where those before it leave something. What takes nearly all away is asked at
+    once whether with one more it leaves nothing.
+    """
+    for witness in (look.as_measured, look.outright):
+        witness()
+        lead = look.leading() if more and look.almost else None
+        if lead is not None or look.enough:
+            return lead, []
+    look.at_rest()
+    if more and look.certain:
+        return None, look.certain
+    if look.moving:
+        look.giving_way_at_once()
+        lead = look.leading() if more and look.almost else None
+        if lead is not None:
+            return lead, []
+    if not look.enough:
+        look.from_nothing_bent()
+    return None, []
 
 
 def _without_support(tried: list[Trial], before: Evaluation) -> bool:
