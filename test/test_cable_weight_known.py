@@ -79,3 +79,19 @@ def test_what_is_known_is_not_stated_any_more() -> None:
     assert np.max(np.abs(known.total.values - truth.elements) / std) < 3.5
     assert np.min(np.sqrt(np.diag(unknown.total.covariance))[4:] / std[4:]) > 0.95
     assert np.max(np.sqrt(np.diag(unknown.total.covariance)) / std) > 1.2
+
+
+def test_chains_that_carry_a_light_body_are_weighed() -> None:
+    """What cables may weigh is no share of what hangs from them."""
+    chain = 3.0
+    spec = shaken(1, 8.0)
+    assert float(spec.elements[0]) < 400.0
+    session, truth = simulate_session(
+        replace(spec, effects={"cable_mass": (chain,)}), np.random.default_rng(5)
+    )
+    found = identify(session)
+    assert [f.effect for f in found.mismatch.findings] == ["cable_mass"]
+    told = found.mismatch.findings[0].parameters["linear_density"]
+    assert abs(told["value"] - chain) < 3.0 * told["std"]  # type: ignore[operator]
+    off = (found.total.values - truth.elements) / np.sqrt(np.diag(found.total.covariance))
+    assert np.max(np.abs(off)) < 3.5
