@@ -8,7 +8,6 @@ the shorter one's result, whose remaining error is already far inside the next b
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, Linearised
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import (
     POLISH,
     Evaluation,
@@ -117,12 +117,12 @@ def solve_growing(
 def settled_starts(problem: Problem, point: Point) -> tuple[State, ...]:
     """Start states that fit best with everything else as it is at ``point``."""
 
-    def settled(run: Run, start: State) -> State:
+    def settled(piece: tuple[Run, State]) -> State:
+        run, start = piece
         found = fit_start(problem.bench, run, point.theta, start, tolerance=0.1, polish=POLISH)
         return start if found is None else found[1]
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        return tuple(pool.map(settled, problem.runs, point.starts))
+    return tuple(side_by_side(settled, zip(problem.runs, point.starts, strict=True)))
 
 
 def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tuple[Linearised, State] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +13,7 @@ from rig_identification.estimate.momentum import balance, regress
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.rest_evidence import coarsened
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import HOPELESS, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
@@ -126,9 +126,8 @@ def launch_state(
 
 
 def launch_states(bench: Bench, runs: tuple[Run, ...], theta: Array, rest: State) -> tuple[State, ...]:
-    """Start states of several runs, two at a time."""
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        return tuple(pool.map(lambda run: launch_state(bench, run, theta, rest), runs))
+    """Start states of several runs."""
+    return tuple(side_by_side(lambda run: launch_state(bench, run, theta, rest), runs))
 
 
 def _launched(

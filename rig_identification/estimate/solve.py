@@ -8,7 +8,6 @@ Laplace covariance (MacKay, "Information Theory, Inference, and Learning Algorit
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +31,7 @@ from rig_identification.estimate.rest_evidence import (
     linearise_rest,
     with_dummy,
 )
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.model import layout
 from rig_identification.model.equilibrium import settle
 from rig_identification.model.motion import State, on_cables
@@ -126,8 +126,7 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
             latent=latent,
         )
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        runs = list(pool.map(one, zip(problem.runs, point.starts, latents, strict=True)))
+    runs = side_by_side(one, zip(problem.runs, point.starts, latents, strict=True))
     if any(r is None for r in runs):
         return None
     rests = []

@@ -17,7 +17,6 @@ catalogue, and in runs that were held out it does so again, with the same travel
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +26,7 @@ from scipy.optimize import differential_evolution, minimize
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import written
@@ -307,21 +307,19 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
     def alike(guess: _Guess) -> _Guess:
         return polished(guess, POLISHED[0], lambda x: float(unlike(guess.axis, x[:, None])[0]))
 
-    # What takes the time holds no lock, and no thread tells another what it found: the same every time
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        every: list[_Guess] = []
-        for seed in SEEDS:
-            every += [g for found in pool.map(scanned, [(axis, seed) for axis in AXES]) for g in found]
-            best = min(every, key=lambda g: g.left)
-            if -best.left < FAINT * AHEAD:
-                # Nothing looks like it at all: no simplex makes so much of that
-                chosen = part(best.axis, best.x)
-                return chosen, along.gain(chosen)
-        guesses: list[_Guess] = []
-        for guess in sorted(every, key=lambda g: g.left):
-            if len(guesses) < STARTS and not any(guess.like(known) for known in guesses):
-                guesses.append(guess)
-        best = min((*guesses, *pool.map(alike, guesses)), key=lambda g: g.left)
+    every: list[_Guess] = []
+    for seed in SEEDS:
+        every += [g for found in side_by_side(scanned, [(axis, seed) for axis in AXES]) for g in found]
+        best = min(every, key=lambda g: g.left)
+        if -best.left < FAINT * AHEAD:
+            # Nothing looks like it at all: no simplex makes so much of that
+            chosen = part(best.axis, best.x)
+            return chosen, along.gain(chosen)
+    guesses: list[_Guess] = []
+    for guess in sorted(every, key=lambda g: g.left):
+        if len(guesses) < STARTS and not any(guess.like(known) for known in guesses):
+            guesses.append(guess)
+    best = min((*guesses, *side_by_side(alike, guesses)), key=lambda g: g.left)
     best = polished(best, POLISHED[1], lambda x: left(best.axis, x))
     chosen = part(best.axis, best.x)
     return chosen, along.gain(chosen)

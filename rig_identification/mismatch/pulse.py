@@ -13,7 +13,6 @@ momentum, and its peak differs by a few percent.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +21,7 @@ from scipy.optimize import minimize
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import pushed
@@ -84,9 +84,7 @@ def likeliest_pulse(fitted: Fitted) -> Pulse | None:
     weight = LIKELY * mass * problem.bench.rig.gravity
     prior = 1.0 / np.repeat([weight, weight * float(np.max(extent(problem.bench.rig)))], 3) ** 2
     every = [_Pulses(problem, evaluation, beyond, index, prior) for index in range(len(problem.runs))]
-    # What takes the time holds no lock
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        scans = list(pool.map(_Pulses.scanned, every))
+    scans = side_by_side(_Pulses.scanned, every)
     pulses, (best, _) = max(zip(every, scans, strict=True), key=lambda found: _gain(found[1][0]))
     if best is None:
         return None
