@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_mismatch_along_measured import quiet
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.fitted import Fitted
@@ -19,10 +20,6 @@ from rig_identification.simulate.start import Pulled
 
 #: N/m along y that a hose adds to some 9 kN/m of swing.
 STIFFNESS = 600.0
-
-
-def quiet(stage: str, fraction: float) -> None:
-    """No progress."""
 
 
 def _fitted(stiffness: float) -> Fitted:

@@ -112,6 +112,11 @@ class Run:
         """How each channel samples what the nodes hold."""
         return tuple(Sampler(self.grid, c.time, c.group, c.node.size) for c in self.channels)
 
+    @property
+    def begins(self) -> tuple[str, float]:
+        """Where it begins: its recording, and s into that. A run and its first piece begin alike."""
+        return self.recording.name, self.offset
+
     def until(self, end: float) -> Run:
         """The same run, cut off at ``end`` seconds."""
         return self.between(0, round(end / self.grid.step), margin=MARGIN)

@@ -171,7 +171,7 @@ def _held_out(fitted: Fitted) -> Iterator[tuple[Run, Linearised]]:
 def held_out_densities(fitted: Fitted) -> dict[tuple[str, float], float]:
     """Log density (nats) of every held-out run after the fit, by its recording's name and its offset (s)."""
     shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
-    return {(run.recording.name, run.offset): log_predictive(shared, full) for run, full in _held_out(fitted)}
+    return {run.begins: log_predictive(shared, full) for run, full in _held_out(fitted)}
 
 
 def weighed_otherwise(fitted: Fitted) -> str | None:

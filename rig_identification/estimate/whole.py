@@ -39,12 +39,9 @@ def fit_whole(
     """
     guess = (*point.rest_guesses, *point.starts)[0]
     rest = find_rest(model_at(whole.bench.parameters, point.theta), guess).state
-    begun = {
-        (run.recording.name, run.offset): state for run, state in zip(parts.runs, point.starts, strict=True)
-    }
+    begun = {run.begins: state for run, state in zip(parts.runs, point.starts, strict=True)}
     starts = tuple(
-        begun.get((run.recording.name, run.offset)) or launch_state(whole.bench, run, point.theta, rest)
-        for run in whole.runs
+        begun.get(run.begins) or launch_state(whole.bench, run, point.theta, rest) for run in whole.runs
     )
     begin = Point(point.theta, starts, point.rest_guesses)
     bends = whole.bench.parameters.model.internal > 0

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.solve import shortened
 from rig_identification.mismatch.candidate import Candidate
@@ -31,19 +30,14 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> list[Promise]:
     if ideal.pieces is not None and ideal.careful is not None:
         # Whole runs bend the body by far more than short pieces do, and the wrench has that to make up for
         there = ideal.careful[1].point
-        begun = dict(zip(map(_begins, ideal.pieces.runs), there.starts, strict=True))
-        if all(_begins(run) in begun for run in problem.runs):
-            starts = tuple(begun[_begins(run)] for run in problem.runs)
+        begun = {run.begins: start for run, start in zip(ideal.pieces.runs, there.starts, strict=True)}
+        if all(run.begins in begun for run in problem.runs):
+            starts = tuple(begun[run.begins] for run in problem.runs)
             point = replace(point, theta=there.theta, starts=starts)
     mass = mass_of(problem, fitted.evaluation)
     seen = driven(problem, point, mass)
     # What the ideal model bent to swallow the force would promise much of being bent back
     return [] if seen is None else screen(*seen, [c for c in candidates if _acts(c)], mass)
-
-
-def _begins(run: Run) -> tuple[str, float]:
-    """Where a run or a piece of one begins: its recording, and s into that."""
-    return run.recording.name, run.offset
 
 
 def _acts(candidate: Candidate) -> bool:

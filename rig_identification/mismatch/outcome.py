@@ -27,9 +27,8 @@ class Alone:
     """What is known and asked only as long as nothing else is in the model."""
 
     law: Law | None = None  # what may explain all where nothing that first order tells of does
-    guess: NDArray[np.float64] | None = (
-        None  # (p,) the problem's parameters where the ideal model's fit began
-    )
+    #: (p,) The problem's parameters where the ideal model's fit began
+    guess: NDArray[np.float64] | None = None
     #: Promises of hypotheses about the motion that was measured
     measured: Callable[[list[Candidate]], list[Promise]] | None = None
 

@@ -108,20 +108,19 @@ def adopted(
     if trial.candidate.settle is not None:
         point = trial.candidate.settle(wide, replace(point, theta=theta), evaluation)
     known = {
-        (run.recording.name, run.offset): start
+        run.begins: start
         for run, start in zip(trial.problem.runs, trial.evaluation.point.starts, strict=True)
     }
     point = replace(point, theta=theta)
     if in_passing:
         starts = tuple(
-            known.get((run.recording.name, run.offset)) or start
-            for run, start in zip(wide.runs, point.starts, strict=True)
+            known.get(run.begins) or start for run, start in zip(wide.runs, point.starts, strict=True)
         )
         there = evaluate(wide, replace(point, starts=starts))
         if there is not None:
             return wide, there
     starts = tuple(
-        known.get((run.recording.name, run.offset)) or _begun(wide, run, point, start)
+        known.get(run.begins) or _begun(wide, run, point, start)
         for run, start in zip(wide.runs, point.starts, strict=True)
     )
     point = replace(point, starts=starts)
