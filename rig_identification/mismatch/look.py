@@ -5,6 +5,7 @@ Which is asked after which search.py says, and what is told of it telling.py.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -188,8 +189,7 @@ class Look:
             if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
             self.notify(promise.candidate.label)
-            # Where the ideal model's fit began nothing is bent, and the body is no worse than a guess
-            for start in reversed(self._unbent):
+            for start in self._as_described():
                 trial = attempt(self.here, start, promise, self.budget, growing=True)
                 if trial is not None:
                     self.tried.append(trial)
@@ -316,7 +316,7 @@ class Look:
     def from_nothing_bent(self) -> None:
         """What first order promises, and fits come to, in a rig as it is described (unbent.py)."""
         self.notify("from where nothing is bent")
-        starts = self._unbent
+        starts = [e for e in (self._about, self._first) if e is not None]
         again = [] if self._about is None else screen(self.here, self._about, self.candidates, self.mass)
         known: set[str] = set()
         for promise in likely(self.promises, again):
@@ -338,11 +338,17 @@ class Look:
         return unbent(self.here, self.seen)
 
     @cached_property
-    def _unbent(self) -> list[Evaluation]:
-        """Where nothing is bent, and where the ideal model's fit began."""
+    def _first(self) -> Evaluation | None:
+        """Where the ideal model's fit began, which is known as long as nothing else is in the model."""
         guess = self.alone.guess
-        first = None if guess is None else at_first(self.here, self.seen, guess)
-        return [e for e in (self._about, first) if e is not None]
+        return None if guess is None else at_first(self.here, self.seen, guess)
+
+    def _as_described(self) -> Iterator[Evaluation]:
+        """Starts at which nothing is bent: first the one whose body is no worse than a guess."""
+        if self._first is not None:
+            yield self._first
+        if self._about is not None:
+            yield self._about
 
     def _decided(self, trial: Trial) -> bool:
         """Whether starting a hypothesis from what the other screening promised of it is of no use."""
