@@ -1,31 +1,33 @@
-"""What acts on the body, told by the motion that was measured and not by the ideal model's.
+"""What is wrong, told by the motion that was measured and not by the ideal model's.
 
 Where the ideal model fails by far its motion is out of step with the real one, and what first order says
 about it is hardly worth more than a guess: of twenty hypotheses each takes about half away. The motion that
 was measured is another matter (measured.py). Along it the missing wrench is known, and of what it is made
-up, dry hinges or a hose, is a regression. Where no wrench leaves only noise nothing acts on the body that
-would do so, and this says nothing.
+up, dry hinges or a hose, is a regression. So is what is wrong with a device: a wrench bends the motion and
+each of the other devices sees that, so that an error of one is told by its own numbers for less. Where no
+wrench leaves only noise nothing that acts on the body would do so, and devices and rig alone are looked at.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.solve import shortened
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.measured import driven
-from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.measured import ENOUGH, driven
+from rig_identification.mismatch.screen import Promise, promises_of, screen, with_reference
 from rig_identification.mismatch.trial import mass_of
 
 #: Seconds of each run that are looked at: along a known motion nothing adds up, and they have it all.
-ENOUGH = 12.0
+LOOKED_AT = 12.0
 
 
 def along_measured(ideal: Ideal, candidates: list[Candidate]) -> list[Promise]:
-    """Promises of forces about the measured motion, best first; none where no wrench explains that motion."""
+    """Promises about the measured motion, best first; of forces only where a wrench explains that motion."""
     fitted = ideal.fitted
-    problem = shortened(with_reference(fitted.problem, fitted.rest), ENOUGH)
+    problem = shortened(with_reference(fitted.problem, fitted.rest), LOOKED_AT)
     point = fitted.evaluation.point
     if ideal.pieces is not None and ideal.careful is not None:
         # Whole runs bend the body by far more than short pieces do, and the wrench has that to make up for
@@ -36,10 +38,14 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> list[Promise]:
             point = replace(point, theta=there.theta, starts=starts)
     mass = mass_of(problem, fitted.evaluation)
     seen = driven(problem, point, mass)
-    # What the ideal model bent to swallow the force would promise much of being bent back
-    return [] if seen is None else screen(*seen, [c for c in candidates if _acts(c)], mass)
+    if seen is None:
+        return []
+    if misfit(seen[1]) <= ENOUGH:
+        return screen(*seen, candidates, mass)
+    numbers = [c for c in candidates if not acts(c)]
+    return sorted(promises_of(*seen, numbers), key=lambda p: -p.gain)
 
 
-def _acts(candidate: Candidate) -> bool:
+def acts(candidate: Candidate) -> bool:
     """Whether a hypothesis is a force, and no number of rig or devices that the lab doubts."""
     return not candidate.doubted and all(p.kind == "physics" for p in candidate.parameters)

@@ -17,6 +17,7 @@ from rig_identification.estimate.solve import (
     excess,
     solve,
 )
+from rig_identification.mismatch.along_measured import acts
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
 from rig_identification.mismatch.at_rest import AtRest, at_rest, both_at_rest, from_rest
 from rig_identification.mismatch.budget import Budget
@@ -185,12 +186,12 @@ class Look:
         most = max((p.gain for p in promises), default=0.0)
         if most < BEATEN:
             return
-        for promise in (p for p in promises if p.gain > CLOSE * most):
+        for promise in [p for p in promises if p.gain > CLOSE * most][:MOST]:
             if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
             self.notify(promise.candidate.label)
             for start in self._as_described():
-                trial = attempt(self.here, start, promise, self.budget, growing=True)
+                trial = attempt(self.here, start, promise, self.budget, growing=acts(promise.candidate))
                 if trial is not None:
                     self.tried.append(trial)
                     if at_noise(trial) or almost(trial, self.seen):

@@ -83,8 +83,8 @@ def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Eval
 def driven(problem: Problem, point: Point, mass: float) -> tuple[Problem, Evaluation] | None:
     """The problem with a random wrench about as strong as what the model lacks, about the measured motion.
 
-    None where a run cannot be followed, or no wrench on the body leaves only noise. Quicker than
-    :func:`measured`, whose wrench is the weakest.
+    None where a run cannot be followed. Quicker than :func:`measured`, whose wrench is the weakest. What is
+    left beyond ``ENOUGH`` no wrench on the body explains.
     """
     there = fitting_wrench(problem, point, mass)
     found = None if there is None else evaluate(*there)
@@ -93,7 +93,7 @@ def driven(problem: Problem, point: Point, mass: float) -> tuple[Problem, Evalua
     for _ in range(ROUNDS):
         moved = _smoothed(there[0], found) if misfit(found) > ENOUGH else None
         found = found if moved is None else moved
-    return None if misfit(found) > ENOUGH else (there[0], found)
+    return there[0], found
 
 
 def _smoothed(problem: Problem, evaluation: Evaluation) -> Evaluation | None:

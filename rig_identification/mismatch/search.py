@@ -112,7 +112,7 @@ def trials(
     elif not gives_way(problem.bench.parameters.model):
         look.ringing()
     found = ended(look)
-    if found.done or far or not more or not look.passed_over():
+    if found.done or far or not look.passed_over():
         return found
     return ended(look)
 
