@@ -92,6 +92,7 @@ class _Standing:
     out: list[Trial] = field(default_factory=list)
     kept: float = 0.0  # most that was promised and kept, nats
     done: bool = False  # one took away all there was
+    fallen: float = 0.0  # most that one took away, nats, promised or not
     reached: float = 0.0  # most that was promised by what leaves only noise
     nearly: float = 0.0  # ... by what leaves next to nothing
     enough: bool = False  # nothing that changes the model is looked for any more
@@ -107,8 +108,10 @@ class _Standing:
         return self._beaten_far(promise) if self.far else self._beaten_near(promise)
 
     def _beaten_near(self, promise: Promise) -> bool:
-        """Whether another one promised much more and kept it, or took all and this changes the model."""
+        """Whether another one promised much more and kept it, took more, or all and this changes the model."""
         if promise.gain < min(CLOSE * self.kept, self.kept - BEATEN):
+            return True
+        if promise.candidate.slow and promise.gain < self.fallen - BEATEN:
             return True
         return self.done and promise.candidate.build is not None and promise.gain < self.kept - NO_TIE
 
@@ -121,7 +124,8 @@ class _Standing:
     def heard(self, promise: Promise, trial: Trial, before: Evaluation, first: bool) -> None:
         """Take a first fit into account. before: without it; first: of the likeliest promise."""
         self.out.append(trial)
-        self.kept = max(self.kept, min(promise.gain, before.cost - trial.evaluation.cost))
+        fallen = before.cost - trial.evaluation.cost
+        self.kept, self.fallen = max(self.kept, min(promise.gain, fallen)), max(self.fallen, fallen)
         self.done = self.done or excess(trial.evaluation) < BEATEN
         if self.far and at_noise(trial):
             self.reached = max(self.reached, promise.gain)
@@ -147,12 +151,7 @@ def begun(
     """
     standing = _Standing(far, gives_way(problem.bench.parameters.model), budget)
     if not far:
-        # What changes no model is fitted in a tenth of the time, and may leave nothing for what does
-        most = max((p.gain for p in worthy), default=0.0)
-        worthy = sorted(
-            worthy,
-            key=lambda p: (p.candidate.build is not None or p.gain < CLOSE * most, -p.gain),
-        )
+        worthy = _quickest_first(worthy)
     for promise in worthy:
         if standing.passes_over(promise):
             continue
@@ -173,6 +172,18 @@ def begun(
     if instead is not None and not any(at_noise(t) for t in standing.out) and not budget.spent():
         instead()
     return standing.out
+
+
+def _quickest_first(worthy: list[Promise]) -> list[Promise]:
+    """Near the noise: promises in the order in which they are fitted.
+
+    What has a few numbers is fitted in a tenth of the time of what changes the model or has many, and may leave
+    nothing for it; what promises little has its turn after both.
+    """
+    most = max((p.gain for p in worthy), default=0.0)
+    soon = max((p.gain for p in worthy if not p.candidate.slow), default=0.0)
+    least = CLOSE * most if soon < CHIEF * most else CLOSE * soon
+    return sorted(worthy, key=lambda p: (p.candidate.slow or p.gain < least, -p.gain))
 
 
 def _furthest(
