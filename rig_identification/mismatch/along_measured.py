@@ -10,11 +10,11 @@ wrench leaves only noise nothing that acts on the body would do so, and devices 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.solve import shortened
+from rig_identification.estimate.solve import excess, shortened
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.measured import ENOUGH, driven
 from rig_identification.mismatch.screen import Promise, promises_of, screen, with_reference
@@ -24,8 +24,16 @@ from rig_identification.mismatch.trial import mass_of
 LOOKED_AT = 12.0
 
 
-def along_measured(ideal: Ideal, candidates: list[Candidate]) -> list[Promise]:
-    """Promises about the measured motion, best first; of forces only where a wrench explains that motion."""
+@dataclass(frozen=True)
+class Along:
+    """What first order says about the motion that was measured."""
+
+    promises: list[Promise]  # best first; of forces only where a wrench explains that motion
+    beyond: bool = False  # whether no wrench does: devices contradict each other, or the rig
+
+
+def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:
+    """Promises about the measured motion."""
     fitted = ideal.fitted
     problem = shortened(with_reference(fitted.problem, fitted.rest), LOOKED_AT)
     point = fitted.evaluation.point
@@ -39,11 +47,13 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> list[Promise]:
     mass = mass_of(problem, fitted.evaluation)
     seen = driven(problem, point, mass)
     if seen is None:
-        return []
+        return Along([])
     if misfit(seen[1]) <= ENOUGH:
-        return screen(*seen, candidates, mass)
-    numbers = [c for c in candidates if not acts(c)]
-    return sorted(promises_of(*seen, numbers), key=lambda p: -p.gain)
+        return Along(screen(*seen, candidates, mass))
+    promises = promises_of(*seen, [c for c in candidates if not acts(c)])
+    left = max(1.0, excess(seen[1]))
+    promises = [replace(p, share=p.gain / left) for p in promises]
+    return Along(sorted(promises, key=lambda p: -p.gain), beyond=True)
 
 
 def acts(candidate: Candidate) -> bool:

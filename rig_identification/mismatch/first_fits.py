@@ -108,7 +108,7 @@ class _Standing:
         return self._beaten_far(promise) if self.far else self._beaten_near(promise)
 
     def _beaten_near(self, promise: Promise) -> bool:
-        """Whether another one promised much more and kept it, took more, or all and this changes the model."""
+        """Whether one promised much more and kept it, or took more, or all and this changes the model."""
         if promise.gain < min(CLOSE * self.kept, self.kept - BEATEN):
             return True
         if promise.candidate.slow and promise.gain < self.fallen - BEATEN:
@@ -177,8 +177,8 @@ def begun(
 def _quickest_first(worthy: list[Promise]) -> list[Promise]:
     """Near the noise: promises in the order in which they are fitted.
 
-    What has a few numbers is fitted in a tenth of the time of what changes the model or has many, and may leave
-    nothing for it; what promises little has its turn after both.
+    What has a few numbers is fitted in a tenth of the time of what changes the model or has many, and may
+    leave nothing for it; what promises little has its turn after both.
     """
     most = max((p.gain for p in worthy), default=0.0)
     soon = max((p.gain for p in worthy if not p.candidate.slow), default=0.0)

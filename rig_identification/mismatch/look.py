@@ -182,11 +182,12 @@ class Look:
         if self.alone.measured is None:
             return
         self.notify("along the motion that was measured")
-        promises = self.alone.measured(self.candidates)
-        most = max((p.gain for p in promises), default=0.0)
+        along = self.alone.measured(self.candidates)
+        most = max((p.gain for p in along.promises), default=0.0)
         if most < BEATEN:
             return
-        for promise in [p for p in promises if p.gain > CLOSE * most][:MOST]:
+        promises = [p for p in along.promises if p.gain > CLOSE * most][:MOST]
+        for promise in promises:
             if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
             self.notify(promise.candidate.label)
@@ -196,6 +197,22 @@ class Look:
                     self.tried.append(trial)
                     if at_noise(trial) or almost(trial, self.seen):
                         break
+        if along.beyond and not self.enough and not self.almost:
+            sure = {p.candidate.label for p in promises if p.share > DIRECT}
+            self.certain = self._contradicting([t for t in self.tried if t.candidate.label in sure])
+
+    def _contradicting(self, told: list[Trial]) -> list[Trial]:
+        """What other devices contradict whatever acts on the body, beside another effect of the motion.
+
+        Not all of its share of what is left: what else there is has that. Of several the one with the fewest
+        numbers says what the others do.
+        """
+        best: dict[str, Trial] = {}
+        for trial in sorted(told, key=lambda t: -t.evidence):
+            best.setdefault(trial.candidate.label, trial)
+        names = [{p.name for p in t.candidate.parameters} for t in best.values()]
+        fewest = [t for t, own in zip(best.values(), names, strict=True) if not any(n < own for n in names)]
+        return self._beside_each([t for t in map(self.finished, fewest) if t is not None])
 
     def outright(self) -> None:
         """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.
@@ -268,21 +285,28 @@ class Look:
             return [] if first is None else [first]
         settled = [t for t in alike if sure[id(t.candidate)].settles]
         ended = [t for t in map(self.finished, settled) if t is not None]
+        return self._beside_each(ended)
+
+    def _beside_each(self, ended: list[Trial]) -> list[Trial]:
+        """Of trials of which one is right, those that leave nothing with one more, likeliest first."""
         if not ended:
             return []
         ended.sort(key=lambda t: -t.evidence)
         self.notify(f"{ended[0].candidate.label}, and one more")
         others = compatible(self.candidates, [ended[0].candidate])
         promises = screen(ended[0].problem, ended[0].evaluation, others, self.mass)
-        if not promises or promises[0].share < DIRECT:
+        stretched = stretching(ended[0].problem, ended[0].evaluation, self.mass)
+        promises += [] if stretched is None else [stretched]
+        promised = max(promises, key=lambda p: p.gain, default=None)
+        if promised is None or promised.share < DIRECT:
             return []
-        sought = promises[0].candidate
+        sought = promised.candidate
         out = []
         for trial in ended:
             if self.budget.spent() or not compatible([sought], [trial.candidate]):
                 continue
             self.notify(f"{trial.candidate.label}, and {sought.label}")
-            second = leaving_nothing(trial, promises[0], self.budget)
+            second = leaving_nothing(trial, promised, self.budget)
             if second is not None:
                 out.append(replace(trial, evidence=second.evidence))
                 self.beside[trial.candidate.label] = [second]

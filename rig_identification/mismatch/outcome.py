@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.along_measured import Along
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial
 
 #: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
@@ -29,8 +29,8 @@ class Alone:
     law: Law | None = None  # what may explain all where nothing that first order tells of does
     #: (p,) The problem's parameters where the ideal model's fit began
     guess: NDArray[np.float64] | None = None
-    #: Promises of hypotheses about the motion that was measured
-    measured: Callable[[list[Candidate]], list[Promise]] | None = None
+    #: What first order says of hypotheses about the motion that was measured
+    measured: Callable[[list[Candidate]], Along] | None = None
 
 
 #: Nothing is asked but what any search asks.

@@ -125,6 +125,8 @@ def _from_afar(look: Look, more: bool) -> tuple[Trial | None, list[Trial]]:
     """
     for witness in (look.as_measured, look.outright):
         witness()
+        if more and look.certain:
+            return None, look.certain
         lead = look.leading() if more and look.almost else None
         if lead is not None or look.enough:
             return lead, []
