@@ -186,7 +186,12 @@ class Look:
         most = max((p.gain for p in along.promises), default=0.0)
         if most < BEATEN:
             return
-        promises = [p for p in along.promises if p.gain > CLOSE * most][:MOST]
+        # What has a few numbers is fitted in a second; a hose takes many, and bends to what is none
+        soon = [p for p in along.promises if not p.candidate.slow]
+        slow = [p for p in along.promises if p.candidate.slow and p.gain > CLOSE * most]
+        least = max((p.gain for p in soon), default=0.0)
+        soon = [p for p in soon if p.gain > CLOSE * least] if least > CHIEF * most else []
+        promises = [*soon[:MOST], *slow[:AT_ONCE]]
         for promise in promises:
             if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
