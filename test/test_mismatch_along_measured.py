@@ -1,4 +1,4 @@
-"""Along the motion that was measured a force on the body is told at once, and that nothing acts on it."""
+"""Along the motion that was measured a force on the body is told at once, and a device that is wrong."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from test_mismatch_push_beside import biased
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal, fit_session, judged, with_pieces
-from rig_identification.mismatch.along_measured import along_measured
+from rig_identification.mismatch.along_measured import Along, acts, along_measured
 from rig_identification.mismatch.first_fits import at_noise
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.identify import identify
+from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.search import worst_pieces
 from rig_identification.mismatch.standing import short_pieces
 from rig_identification.mismatch.trial import VERY_FAR, attempt
 from rig_identification.mismatch.unbent import at_first
-from rig_identification.recording import Session
+from rig_identification.recording import Recording, Session
 from rig_identification.simulate import simulate_session
 
 #: N m of each hinge.
@@ -36,7 +38,7 @@ def _ideal(session: Session) -> Ideal:
     return with_pieces(Ideal(fitted, *judged(fitted)), quiet)
 
 
-def _promises(ideal: Ideal) -> list[Promise]:
+def _along(ideal: Ideal) -> Along:
     return along_measured(ideal, catalogue(with_reference(ideal.fitted.problem, ideal.fitted.rest)))
 
 
@@ -47,7 +49,9 @@ def rubbing() -> Ideal:
 
 
 def test_dry_hinges_stand_out_of_all_that_brakes(rubbing: Ideal) -> None:
-    first, *others = _promises(rubbing)
+    along = _along(rubbing)
+    assert not along.beyond
+    first, *others = along.promises
     assert first.candidate.effect == "hinge_friction"
     assert first.gain > 1.2 * max(other.gain for other in others)
     assert abs(first.values["hinge.friction"] - RUBBING) < 0.3 * RUBBING
@@ -62,14 +66,52 @@ def test_what_it_tells_comes_to_the_noise_from_a_body_that_is_far_off(rubbing: I
     here, seen = worst_pieces(here, evaluation)
     start = at_first(here, seen, rubbing.fitted.guess.theta)
     assert start is not None
-    grown = attempt(here, start, _promises(rubbing)[0], growing=True)
+    grown = attempt(here, start, _along(rubbing).promises[0], growing=True)
     assert grown is not None
     assert at_noise(grown)
     told = grown.problem.bench.parameters.named(grown.evaluation.point.theta)
     assert abs(told["hinge.friction"] - RUBBING) < 0.02 * RUBBING
 
 
+def _off(effects: dict[str, tuple[float, ...]]) -> Session:
+    """A session whose gyroscope is off by 0.05 rad/s about x."""
+    made, _ = simulate_session(replace(shaken(10, 12.0), effects=effects), np.random.default_rng(4))
+    return replace(made, recordings=tuple(biased(r, 0.05) for r in made.recordings))
+
+
 def test_a_gyroscope_that_is_off_is_no_force() -> None:
-    session, _ = simulate_session(shaken(10, 12.0), np.random.default_rng(4))
-    off = replace(session, recordings=tuple(biased(r, 0.05) for r in session.recordings))
-    assert _promises(_ideal(off)) == []
+    along = _along(_ideal(_off({})))
+    assert along.beyond
+    assert not any(acts(p.candidate) or p.candidate.build is not None for p in along.promises)
+    most = along.promises[0].gain
+    (bias,) = (p for p in along.promises if set(p.values) == {"imu.gyroscope_bias.x"})
+    # A sensitivity to gravity, with the bias free beside it, says the same in more numbers
+    assert bias.gain > 0.9 * most
+    assert bias.values["imu.gyroscope_bias.x"] == pytest.approx(0.05, rel=0.2)
+
+
+def _lagging(recording: Recording, lag: float) -> Recording:
+    """The recording with its first cell behind a low-pass of time constant ``lag`` (s)."""
+    name, tension = next(iter(recording.tension.items()))
+    step = float(np.median(np.diff(tension.time)))
+    decay = np.exp(-step / lag)
+    values = tension.values.astype(float)
+    start = [decay * values[0]]
+    late = lfilter([1.0 - decay], [1.0, -decay], values, axis=0, zi=start)[0]
+    return replace(recording, tension={**recording.tension, name: replace(tension, values=late)})
+
+
+def test_a_cell_that_lags_is_told_from_forces() -> None:
+    made, _ = simulate_session(shaken(10, 12.0), np.random.default_rng(4))
+    session = replace(made, recordings=tuple(_lagging(r, 0.05) for r in made.recordings))
+    cell = next(iter(made.recordings[0].tension))
+    first = _along(_ideal(session)).promises[0]
+    assert first.candidate.label in (f"sensor_lag {cell}", f"clock_offset {cell}")
+
+
+def test_what_devices_contradict_leads_to_what_acts_on_the_body() -> None:
+    said: list[str] = []
+    found = identify(_off({"hinge_friction": (RUBBING,)}), lambda stage, share: said.append(stage))
+    assert found.mismatch.verdict == "explained"
+    assert {f.effect for f in found.mismatch.findings} == {"imu_bias", "hinge_friction"}
+    assert any("imu_bias imu x, and hinge_friction" in stage for stage in said)

@@ -12,10 +12,12 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import evaluate
 from rig_identification.mismatch.amounts import stretching
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.search import _settled
 from rig_identification.mismatch.trial import VERY_FAR, attempt, mass_of
 from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, unbent
 from rig_identification.simulate import simulate_session
@@ -41,6 +43,15 @@ def test_a_rig_is_straightened_and_its_body_stays(fitted: Fitted) -> None:
     bounded = [i for i, q in enumerate(fitted.problem.bench.parameters.free, start=INERTIAL) if q.bounded]
     assert INERTIAL in bounded
     assert np.all(straight.point.theta[bounded] == 0.0)
+
+
+def test_first_order_is_taken_about_a_minimum(fitted: Fitted) -> None:
+    theta = fitted.evaluation.point.theta.copy()
+    theta[INERTIAL] += BENT
+    bent = evaluate(fitted.problem, replace(fitted.evaluation.point, theta=theta))
+    assert bent is not None
+    assert bent.cost > fitted.evaluation.cost + 3.0
+    assert _settled(fitted.problem, bent).cost == pytest.approx(fitted.evaluation.cost, abs=1.0)
 
 
 def test_the_better_of_two_starts_is_kept(fitted: Fitted) -> None:
