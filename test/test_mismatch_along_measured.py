@@ -13,10 +13,11 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal, fit_session, judged, with_pieces
 from rig_identification.mismatch.along_measured import Along, acts, along_measured
+from rig_identification.mismatch.candidate import MANY, Candidate, added
 from rig_identification.mismatch.first_fits import at_noise
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.identify import identify
-from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.search import worst_pieces
 from rig_identification.mismatch.standing import short_pieces
 from rig_identification.mismatch.trial import VERY_FAR, attempt
@@ -26,6 +27,26 @@ from rig_identification.simulate import simulate_session
 
 #: N m of each hinge.
 RUBBING = 20.0
+
+
+def _promise(name: str, gain: float, numbers: int = 1) -> Promise:
+    parameters = tuple(added(f"{name}.{k}", "1", 1.0, k) for k in range(numbers))
+    return Promise(Candidate(name, parameters, "", ""), gain, {})
+
+
+@pytest.mark.parametrize(
+    ("lag", "gain", "hose", "worthy"),
+    [
+        (60.0, 55.0, 100.0, ["lag", "gain", "hose"]),
+        (60.0, 30.0, 100.0, ["lag", "hose"]),  # half of the lag's is little
+        (40.0, 39.0, 100.0, ["hose"]),  # less than half of the best
+        (100.0, 20.0, 60.0, ["lag"]),
+        (25.0, 20.0, 29.0, []),  # a few nats of so much
+    ],
+)
+def test_few_numbers_are_tried_before_a_hose(lag: float, gain: float, hose: float, worthy: list[str]) -> None:
+    along = Along([_promise("lag", lag), _promise("gain", gain), _promise("hose", hose, MANY)])
+    assert [p.candidate.effect for p in along.worthy] == worthy
 
 
 def quiet(stage: str, fraction: float) -> None:

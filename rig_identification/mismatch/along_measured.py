@@ -15,13 +15,17 @@ from dataclasses import dataclass, replace
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.solve import excess, shortened
+from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.first_fits import BEATEN, CLOSE
 from rig_identification.mismatch.measured import ENOUGH, driven
 from rig_identification.mismatch.screen import Promise, promises_of, screen, with_reference
 from rig_identification.mismatch.trial import mass_of
 
 #: Seconds of each run that are looked at: along a known motion nothing adds up, and they have it all.
 LOOKED_AT = 12.0
+#: Promises that are fitted at most: of what is fitted in a second, and of what is fitted slowly.
+FEW, SLOW = 4, 3
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,21 @@ class Along:
 
     promises: list[Promise]  # best first; of forces only where a wrench explains that motion
     beyond: bool = False  # whether no wrench does: devices contradict each other, or the rig
+
+    @property
+    def worthy(self) -> list[Promise]:
+        """Those that are worth a fit, what has a few numbers first.
+
+        That is fitted in a second; a hose takes many, and bends to what is none.
+        """
+        most = max((p.gain for p in self.promises), default=0.0)
+        if most < BEATEN:
+            return []
+        slow = [p for p in self.promises if p.candidate.slow and p.gain > CLOSE * most]
+        soon = [p for p in self.promises if not p.candidate.slow]
+        best = max((p.gain for p in soon), default=0.0)
+        soon = [p for p in soon if p.gain > CLOSE * best] if best > CHIEF * most else []
+        return [*soon[:FEW], *slow[:SLOW]]
 
 
 def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:

@@ -183,16 +183,7 @@ class Look:
             return
         self.notify("along the motion that was measured")
         along = self.alone.measured(self.candidates)
-        most = max((p.gain for p in along.promises), default=0.0)
-        if most < BEATEN:
-            return
-        # What has a few numbers is fitted in a second; a hose takes many, and bends to what is none
-        soon = [p for p in along.promises if not p.candidate.slow]
-        slow = [p for p in along.promises if p.candidate.slow and p.gain > CLOSE * most]
-        least = max((p.gain for p in soon), default=0.0)
-        soon = [p for p in soon if p.gain > CLOSE * least] if least > CHIEF * most else []
-        promises = [*soon[:MOST], *slow[:AT_ONCE]]
-        for promise in promises:
+        for promise in along.worthy:
             if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
             self.notify(promise.candidate.label)
@@ -203,7 +194,7 @@ class Look:
                     if at_noise(trial) or almost(trial, self.seen):
                         break
         if along.beyond and not self.enough and not self.almost:
-            sure = {p.candidate.label for p in promises if p.share > DIRECT}
+            sure = {p.candidate.label for p in along.worthy if p.share > DIRECT}
             self.certain = self._contradicting([t for t in self.tried if t.candidate.label in sure])
 
     def _contradicting(self, told: list[Trial]) -> list[Trial]:
