@@ -16,6 +16,7 @@ from itertools import combinations
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.first_fits import BEATEN
 from rig_identification.mismatch.hypotheses import compatible, needed_gain, net_gain
 from rig_identification.mismatch.screen import Promise, promises_of, together
 from rig_identification.mismatch.trial import Trial, attempt, beyond_doubt, fitted_to_its_end, ordinary_errors
@@ -75,16 +76,19 @@ def first_of_two(
     if second is None:
         return Led(first, False)
     ordinary = ordinary_errors(problem)
-    kept = evaluation.cost - second.evaluation.cost - _cost((one, other), count) > max(alone, 0.0) + ahead
+    taken = evaluation.cost - second.evaluation.cost
+    kept = taken - _cost((one, other), count) > max(alone, 0.0) + ahead
     # What the first took away by itself, further along than first order saw, needs no other one
     kept = kept and first.evaluation.cost - second.evaluation.cost > needed_gain(other, count)
     meant = all(beyond_doubt(replace(second, candidate=c), ordinary, limit) for c in (one, other))
     if not (kept and meant):
         return Led(first, False)
     slow = None
-    if single is not None and single.candidate.slow and alone > 0.0 and not budget.spent():
-        notify(single.candidate.label)
-        slow = fitted_to_its_end(problem, evaluation, single, budget)
+    # A hose that promises 75 nats of what two numbers take 240 of takes a minute to say so
+    rival = single if single is not None and single.candidate.slow and single.gain > taken - BEATEN else None
+    if rival is not None and alone > 0.0 and not budget.spent():
+        notify(rival.candidate.label)
+        slow = fitted_to_its_end(problem, evaluation, rival, budget)
     instead = slow is not None and slow.evidence > second.evidence - ahead
     return Led(first, not instead, slow if instead else None)
 
