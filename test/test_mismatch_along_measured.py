@@ -94,14 +94,14 @@ def test_what_it_tells_comes_to_the_noise_from_a_body_that_is_far_off(rubbing: I
     assert abs(told["hinge.friction"] - RUBBING) < 0.02 * RUBBING
 
 
-def _off(effects: dict[str, tuple[float, ...]]) -> Session:
-    """A session whose gyroscope is off by 0.05 rad/s about x."""
+def _off(bias: float, effects: dict[str, tuple[float, ...]]) -> Session:
+    """A session whose gyroscope is off by ``bias`` (rad/s) about x."""
     made, _ = simulate_session(replace(shaken(10, 12.0), effects=effects), np.random.default_rng(4))
-    return replace(made, recordings=tuple(biased(r, 0.05) for r in made.recordings))
+    return replace(made, recordings=tuple(biased(r, bias) for r in made.recordings))
 
 
 def test_a_gyroscope_that_is_off_is_no_force() -> None:
-    along = _along(_ideal(_off({})))
+    along = _along(_ideal(_off(0.05, {})))
     assert along.beyond
     assert not any(acts(p.candidate) or p.candidate.build is not None for p in along.promises)
     most = along.promises[0].gain
@@ -132,7 +132,7 @@ def test_a_cell_that_lags_is_told_from_forces() -> None:
 
 def test_what_devices_contradict_leads_to_what_acts_on_the_body() -> None:
     said: list[str] = []
-    found = identify(_off({"hinge_friction": (RUBBING,)}), lambda stage, share: said.append(stage))
+    found = identify(_off(0.012, {"hinge_friction": (4.0,)}), lambda stage, share: said.append(stage))
     assert found.mismatch.verdict == "explained"
     assert {f.effect for f in found.mismatch.findings} == {"imu_bias", "hinge_friction"}
     assert any("imu_bias imu x, and hinge_friction" in stage for stage in said)
