@@ -54,3 +54,11 @@ def test_what_takes_more_than_a_hose_promises_spares_its_fit(took: float, spared
     standing.heard(mass, trial, _Fitted(0.0), True)  # type: ignore[arg-type]
     assert standing.passes_over(hose) is spared
     assert not standing.passes_over(other)
+
+
+def test_a_hose_spares_no_other_ones_fit() -> None:
+    standing = _Standing(far=False, rings=False, budget=UNLIMITED)
+    general, along_y = _promise("hose", 110.0, MANY), _promise("hose y", 100.0, MANY)
+    trial = SimpleNamespace(evaluation=_Fitted(-400.0), candidate=general.candidate)
+    standing.heard(general, trial, _Fitted(0.0), True)  # type: ignore[arg-type]
+    assert not standing.passes_over(along_y)

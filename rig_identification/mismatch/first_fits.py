@@ -92,7 +92,7 @@ class _Standing:
     out: list[Trial] = field(default_factory=list)
     kept: float = 0.0  # most that was promised and kept, nats
     done: bool = False  # one took away all there was
-    fallen: float = 0.0  # most that one took away, nats, promised or not
+    fallen: float = 0.0  # most that one of a few numbers took away, nats, promised or not
     reached: float = 0.0  # most that was promised by what leaves only noise
     nearly: float = 0.0  # ... by what leaves next to nothing
     enough: bool = False  # nothing that changes the model is looked for any more
@@ -125,7 +125,10 @@ class _Standing:
         """Take a first fit into account. before: without it; first: of the likeliest promise."""
         self.out.append(trial)
         fallen = before.cost - trial.evaluation.cost
-        self.kept, self.fallen = max(self.kept, min(promise.gain, fallen)), max(self.fallen, fallen)
+        self.kept = max(self.kept, min(promise.gain, fallen))
+        if not promise.candidate.slow:
+            # A hose of any direction bends to more than the one that is there
+            self.fallen = max(self.fallen, fallen)
         self.done = self.done or excess(trial.evaluation) < BEATEN
         if self.far and at_noise(trial):
             self.reached = max(self.reached, promise.gain)
