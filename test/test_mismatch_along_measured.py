@@ -29,7 +29,8 @@ from rig_identification.simulate import simulate_session
 RUBBING = 20.0
 
 
-def _promise(name: str, gain: float, numbers: int = 1) -> Promise:
+def promise(name: str, gain: float, numbers: int = 1) -> Promise:
+    """A promise of a hypothesis of so many numbers, nats."""
     parameters = tuple(added(f"{name}.{k}", "1", 1.0, k) for k in range(numbers))
     return Promise(Candidate(name, parameters, "", ""), gain, {})
 
@@ -45,7 +46,7 @@ def _promise(name: str, gain: float, numbers: int = 1) -> Promise:
     ],
 )
 def test_few_numbers_are_tried_before_a_hose(lag: float, gain: float, hose: float, worthy: list[str]) -> None:
-    along = Along([_promise("lag", lag), _promise("gain", gain), _promise("hose", hose, MANY)])
+    along = Along([promise("lag", lag), promise("gain", gain), promise("hose", hose, MANY)])
     assert [p.candidate.effect for p in along.worthy] == worthy
 
 

@@ -7,18 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from test_mismatch_along_measured import promise
 
 from rig_identification.mismatch.budget import UNLIMITED
-from rig_identification.mismatch.candidate import MANY, Candidate, added
+from rig_identification.mismatch.candidate import MANY
 from rig_identification.mismatch.first_fits import BEATEN, _quickest_first, _Standing
-from rig_identification.mismatch.screen import Promise
 
 SAMPLES = 100
-
-
-def _promise(name: str, gain: float, numbers: int = 1) -> Promise:
-    parameters = tuple(added(f"{name}.{k}", "1", 1.0, k) for k in range(numbers))
-    return Promise(Candidate(name, parameters, "", ""), gain, {})
 
 
 @pytest.mark.parametrize(
@@ -31,7 +26,7 @@ def _promise(name: str, gain: float, numbers: int = 1) -> Promise:
 )
 def test_few_numbers_come_before_many(gains: tuple[float, float, float], order: list[str]) -> None:
     hose, mass, gain = gains
-    worthy = [_promise("hose", hose, MANY), _promise("mass", mass), _promise("gain", gain)]
+    worthy = [promise("hose", hose, MANY), promise("mass", mass), promise("gain", gain)]
     assert [p.candidate.effect for p in _quickest_first(worthy)] == order
 
 
@@ -49,7 +44,7 @@ class _Fitted:
 @pytest.mark.parametrize(("took", "spared"), [(100.0 + 2.0 * BEATEN, True), (100.0, False)])
 def test_what_takes_more_than_a_hose_promises_spares_its_fit(took: float, spared: bool) -> None:
     standing = _Standing(far=False, rings=False, budget=UNLIMITED)
-    mass, hose, other = _promise("mass", 90.0), _promise("hose", 100.0, MANY), _promise("other", 100.0)
+    mass, hose, other = promise("mass", 90.0), promise("hose", 100.0, MANY), promise("other", 100.0)
     trial = SimpleNamespace(evaluation=_Fitted(-took), candidate=mass.candidate)
     standing.heard(mass, trial, _Fitted(0.0), True)  # type: ignore[arg-type]
     assert standing.passes_over(hose) is spared
@@ -58,7 +53,7 @@ def test_what_takes_more_than_a_hose_promises_spares_its_fit(took: float, spared
 
 def test_a_hose_spares_no_other_ones_fit() -> None:
     standing = _Standing(far=False, rings=False, budget=UNLIMITED)
-    general, along_y = _promise("hose", 110.0, MANY), _promise("hose y", 100.0, MANY)
+    general, along_y = promise("hose", 110.0, MANY), promise("hose y", 100.0, MANY)
     trial = SimpleNamespace(evaluation=_Fitted(-400.0), candidate=general.candidate)
     standing.heard(general, trial, _Fitted(0.0), True)  # type: ignore[arg-type]
     assert not standing.passes_over(along_y)

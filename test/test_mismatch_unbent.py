@@ -17,8 +17,7 @@ from rig_identification.mismatch.amounts import stretching
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
-from rig_identification.mismatch.search import _settled
-from rig_identification.mismatch.trial import VERY_FAR, attempt, mass_of
+from rig_identification.mismatch.trial import VERY_FAR, at_minimum, attempt, mass_of
 from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, unbent
 from rig_identification.simulate import simulate_session
 
@@ -51,7 +50,7 @@ def test_first_order_is_taken_about_a_minimum(fitted: Fitted) -> None:
     bent = evaluate(fitted.problem, replace(fitted.evaluation.point, theta=theta))
     assert bent is not None
     assert bent.cost > fitted.evaluation.cost + 3.0
-    assert _settled(fitted.problem, bent).cost == pytest.approx(fitted.evaluation.cost, abs=1.0)
+    assert at_minimum(fitted.problem, bent).cost == pytest.approx(fitted.evaluation.cost, abs=1.0)
 
 
 def test_the_better_of_two_starts_is_kept(fitted: Fitted) -> None:

@@ -10,12 +10,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from rig_identification.estimate.solve import (
-    POLISH,
     Evaluation,
     Problem,
     evaluate,
     excess,
-    solve,
 )
 from rig_identification.mismatch.along_measured import acts
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
@@ -44,8 +42,8 @@ from rig_identification.mismatch.screen import Promise, carried, extended, scree
 from rig_identification.mismatch.simpler import fitted_simpler
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
-    FIRST_STEPS,
     Trial,
+    at_minimum,
     attempt,
     finished,
     fitted_from,
@@ -133,13 +131,7 @@ class Look:
         there = excess(self.seen)
         if not self.far:
             return there
-        try:
-            fitted, _ = solve(
-                self.here, self.seen.point, iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH
-            )
-        except FloatingPointError:
-            return there
-        return max(there, excess(fitted)) if fitted.cost < self.seen.cost else there
+        return max(there, excess(at_minimum(self.here, self.seen)))
 
     def enough_with(self, trial: Trial) -> bool:
         """Whether a trial leaves only noise, but for a while maybe, or next to nothing of what was left."""

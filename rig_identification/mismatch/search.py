@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
-from rig_identification.estimate.solve import POLISH, Evaluation, Problem, evaluate, excess, solve
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
@@ -25,7 +25,7 @@ from rig_identification.mismatch.pairs import first_of_two
 from rig_identification.mismatch.screen import Promise, screen
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.telling import ended, leads, told_of
-from rig_identification.mismatch.trial import FIRST_STEPS, VERY_FAR, Trial, mass_of
+from rig_identification.mismatch.trial import VERY_FAR, Trial, at_minimum, mass_of
 
 #: Effects looked for at most.
 MOST_EFFECTS = 2
@@ -76,7 +76,7 @@ def trials(
     if far:
         problem, evaluation = worst_pieces(problem, evaluation)
         if more and misfit(evaluation) <= VERY_FAR:
-            evaluation = _settled(problem, evaluation)
+            evaluation = at_minimum(problem, evaluation)
     promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
     led = None
@@ -117,20 +117,6 @@ def trials(
     if found.done or far or not look.passed_over():
         return found
     return ended(look)
-
-
-def _settled(problem: Problem, evaluation: Evaluation) -> Evaluation:
-    """Where a fit stands that takes the recordings as they are; where there is none, ``evaluation``.
-
-    Where the search begins channels were weighed by their residuals (cautious.py). First order is about a
-    minimum, and where bending the rig alone promises all that is left everything else promises nothing. Where
-    very much is left such a fit bends the rig by more than first order reaches.
-    """
-    try:
-        fitted, _ = solve(problem, evaluation.point, iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH)
-    except FloatingPointError:
-        return evaluation
-    return fitted if fitted.cost < evaluation.cost else evaluation
 
 
 def _from_afar(look: Look, more: bool) -> tuple[Trial | None, list[Trial]]:
