@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.solve import excess, shortened
+from rig_identification.estimate.solve import Point, Problem, excess, shortened
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.first_fits import BEATEN, CLOSE
 from rig_identification.mismatch.measured import ENOUGH, driven
 from rig_identification.mismatch.screen import Promise, promises_of, screen, with_reference
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.trial import Trial, mass_of
 
 #: Seconds of each run that are looked at: along a known motion nothing adds up, and they have it all.
 LOOKED_AT = 12.0
@@ -63,7 +63,19 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:
         if all(run.begins in begun for run in problem.runs):
             starts = tuple(begun[run.begins] for run in problem.runs)
             point = replace(point, theta=there.theta, starts=starts)
-    mass = mass_of(problem, fitted.evaluation)
+    return _along(problem, point, candidates, mass_of(problem, fitted.evaluation))
+
+
+def along_beside(first: Trial, candidates: list[Candidate], mass: float) -> Along:
+    """Promises about the measured motion with a first effect in the model, on the pieces it is fitted to.
+
+    A fit with one effect of two is as far out of step as the ideal model's.
+    """
+    return _along(first.problem, first.evaluation.point, candidates, mass)
+
+
+def _along(problem: Problem, point: Point, candidates: list[Candidate], mass: float) -> Along:
+    """Promises about the motion that was measured, from a point of a problem."""
     seen = driven(problem, point, mass)
     if seen is None:
         return Along([])

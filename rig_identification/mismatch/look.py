@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.solve import (
     Evaluation,
     Problem,
     evaluate,
     excess,
 )
-from rig_identification.mismatch.along_measured import acts
+from rig_identification.mismatch.along_measured import acts, along_beside
 from rig_identification.mismatch.amounts import CHIEF, WORTH, far_promises, ringing_like, stretching, supports
 from rig_identification.mismatch.at_rest import AtRest, at_rest, both_at_rest, from_rest
 from rig_identification.mismatch.budget import Budget
@@ -42,6 +43,7 @@ from rig_identification.mismatch.screen import Promise, carried, extended, scree
 from rig_identification.mismatch.simpler import fitted_simpler
 from rig_identification.mismatch.supports import gives_way
 from rig_identification.mismatch.trial import (
+    VERY_FAR,
     Trial,
     at_minimum,
     attempt,
@@ -286,8 +288,17 @@ class Look:
         stretched = stretching(ended[0].problem, ended[0].evaluation, self.mass)
         promises += [] if stretched is None else [stretched]
         promised = max(promises, key=lambda p: p.gain, default=None)
-        if promised is None or promised.share < DIRECT:
-            return []
+        if promised is not None and promised.share >= DIRECT:
+            return self._leaving_nothing(ended, promised)
+        if misfit(ended[0].evaluation) > VERY_FAR and not self.budget.spent():
+            for promise in along_beside(ended[0], others, self.mass).worthy:
+                found = self._leaving_nothing(ended, promise)
+                if found or self.budget.spent():
+                    return found
+        return []
+
+    def _leaving_nothing(self, ended: list[Trial], promised: Promise) -> list[Trial]:
+        """Of trials of which one is right, those that leave nothing with what was promised beside one."""
         sought = promised.candidate
         out = []
         for trial in ended:
