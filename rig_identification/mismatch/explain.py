@@ -6,15 +6,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
+from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal, near_noise, with_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.burst import burst
 from rig_identification.mismatch.disagreeing import where_runs_disagree
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
 from rig_identification.mismatch.lawful import law_of_pieces, lawful_instead
 from rig_identification.mismatch.left_over import unexplained
-from rig_identification.mismatch.locate import calm_pieces
+from rig_identification.mismatch.locate import Event, calm_pieces
 from rig_identification.mismatch.named import named
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse
 from rig_identification.mismatch.push import (
@@ -33,7 +35,7 @@ from rig_identification.mismatch.push import (
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.standing import Search, short_pieces
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.trial import VERY_FAR, mass_of
 from rig_identification.mismatch.undecided import undecided
 
 Notify = Callable[[str, float], None]
@@ -107,6 +109,8 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         calm = cache(partial(calm_pieces, here, evaluation))
         pushed = without_push(ideal, problem, here, evaluation, pulse, notify, calm)
         pushed = pushed or _beside_push(ideal, here, evaluation, notify, budget, calm)
+        if pushed is None and misfit(evaluation) > VERY_FAR:
+            pushed = _beside_event(ideal, here, burst(here, evaluation), notify, budget)
         if pushed is not None:
             return pushed
     near = search.whole
@@ -163,7 +167,13 @@ def _beside_push(
     calm: Calmed = nothing_known,
 ) -> Explained | None:
     """What explains the session outside a push; None where nothing pushes, or nothing explains the rest."""
-    event = push_beside(here, evaluation, notify, calm)
+    return _beside_event(ideal, here, push_beside(here, evaluation, notify, calm), notify, budget)
+
+
+def _beside_event(
+    ideal: Ideal, here: Problem, event: Event | None, notify: Notify, budget: Budget
+) -> Explained | None:
+    """What explains the session outside an event; None where there is none, or nothing explains the rest."""
     if event is None:
         return None
     found = _explain(outside(ideal, event.recording, event.start, event.end, notify), notify, budget)
