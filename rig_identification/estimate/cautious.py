@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.rest_evidence import RestEvidence
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.solve import POLISH, Damping, Evaluation, Point, Problem, evaluate, solve
 
 Array = NDArray[np.float64]
 
@@ -97,9 +97,13 @@ def solve_cautiously(parts: Problem, point: Point) -> tuple[Problem, Evaluation]
     current = evaluate(parts, point, residuals_only=True)
     if current is None:
         return parts, solve(parts, point, iterations=ROUNDS * STEPS)[0]
-    weighed, evaluation = parts, current
-    for _ in range(ROUNDS):
+    weighed, evaluation, damped = parts, current, Damping()
+    for k in range(ROUNDS):
         weighed = reweighted(parts, current)
-        evaluation, _ = solve(weighed, current.point, iterations=STEPS, tolerance=0.5)
+        # Weights are made anew: only the last of them are worth a fit to its end
+        polish = POLISH if k + 1 < ROUNDS else 0.0
+        evaluation, _ = solve(
+            weighed, current.point, damped=damped, iterations=STEPS, tolerance=0.5, polish=polish
+        )
         current = evaluate(parts, evaluation.point, residuals_only=True) or current
     return weighed, evaluation

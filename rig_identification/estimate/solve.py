@@ -384,10 +384,22 @@ def on_plateau(evaluation: Evaluation) -> bool:
     return bool(np.mean(residual**2) > HOPELESS and np.any(vague[1:]))
 
 
+@dataclass
+class Damping:
+    """How much steps are damped: in parts of what a unit step in each unknown's own scale costs.
+
+    A fit that goes on where another one of much the same problem ended goes on with its damping: to find it
+    again takes half a dozen steps that do not pay.
+    """
+
+    value: float = 1e-6
+
+
 def solve(
     problem: Problem,
     point: Point,
     *,
+    damped: Damping | None = None,
     iterations: int = 30,
     tolerance: float = 1e-3,
     polish: float = 0.0,
@@ -405,15 +417,17 @@ def solve(
     win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count. Where ``stop`` says so the fit
-    ends after the step that it tries, unconverged.
+    ends after the step that it tries, unconverged. damped: what it begins with, and what it came to after.
     """
+    damped = damped or Damping()
     current = evaluate(problem, point)
     if current is None:
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
-    damping, failed, creeping, idle, spent, against = 1e-6, 0.0, 0, 0, 0.0, 0
+    damping, failed, creeping, idle, spent, against = damped.value, 0.0, 0, 0, 0.0, 0
     for iteration in range(iterations):
         turned_back = False
         while True:
+            damped.value = damping
             if spent > PATIENCE * iterations:
                 return current, _as_good_as_settled(problem, current)
             # About as little damping failed last

@@ -43,15 +43,16 @@ class Beyond:
         inside = full.information[np.ix_(base, base)] * np.outer(self._scale, self._scale)
         self._factor = cho_factor(inside + 1e-12 * np.eye(base.size))
 
-    def of(self, runs: Sequence[Array], rests: Sequence[Array] = ()) -> Columns:
-        """Columns (m, c) of every run, and of every rest pose where they show there."""
-        count, place = runs[0].shape[1], self.size
+    def of(self, runs: Sequence[Array | None], rests: Sequence[Array] = ()) -> Columns:
+        """Columns (m, c) of every run, None where they do not show, and of every rest pose where they do."""
+        count, place = next(columns.shape[1] for columns in runs if columns is not None), self.size
         cross, gradient = np.zeros((self.full.information.shape[0], count)), np.zeros(count)
         for run, columns in zip(self.full.runs, runs, strict=True):
             starts = run.jacobian.shape[1] - self.size
-            rows = np.concatenate([np.arange(self.size), np.arange(place, place + starts)])
-            cross[rows] += run.jacobian.T @ columns
-            gradient += columns.T @ run.residual
+            if columns is not None:
+                rows = np.concatenate([np.arange(self.size), np.arange(place, place + starts)])
+                cross[rows] += run.jacobian.T @ columns
+                gradient += columns.T @ run.residual
             place += starts
         for rest, columns in zip(self.full.rests, rests, strict=False):
             cross[: self.size] += rest.jacobian.T @ columns

@@ -9,11 +9,14 @@ time, mostly as a constant; what pushes for a second is in it for that second.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.locate import Event
 from rig_identification.mismatch.measured import driven
 from rig_identification.mismatch.trial import mass_of
+
+Array = NDArray[np.float64]
 
 #: Seconds over which the wrench is averaged.
 BIN = 0.25
@@ -50,7 +53,7 @@ def burst(problem: Problem, evaluation: Evaluation) -> Event | None:
     return Event(names.pop(), start.offset, end.offset + end.grid.duration, evaluation.point, calm)
 
 
-def _shortest(squares: np.ndarray) -> tuple[int, int]:
+def _shortest(squares: Array) -> tuple[int, int]:
     """First bin, and the one after the last, of the shortest stretch that holds ``HELD`` of the sum."""
     total = np.concatenate([[0.0], np.cumsum(squares)])
     ends = np.searchsorted(total, total[:-1] + HELD * total[-1])

@@ -21,6 +21,7 @@ from rig_identification.mismatch.named import named
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse
 from rig_identification.mismatch.push import (
     Calmed,
+    Likeliest,
     Pushes,
     chiefly,
     nothing_known,
@@ -90,18 +91,20 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         return None
     fitted = ideal.fitted
     notify("search: a push", 0.02)
-    pulse = likeliest_pulse(fitted)
+    pulse = cache(partial(likeliest_pulse, fitted))
     problem = with_reference(fitted.problem, fitted.rest)
     promises: list[Promise] | None = None
-    # Far from the noise first order tells of a push only where little else is wrong
-    if pulse is not None and (near_noise(fitted) or chiefly(pulse, fitted)):
-        promises = screen(problem, fitted.evaluation, catalogue(problem), mass_of(problem, fitted.evaluation))
-        pulsed = _pulsed(ideal, pulse, promises, notify, budget)
-        if pulsed is not None:
-            return pulsed
     here, evaluation = short_pieces(ideal) or (problem, evaluate(problem, fitted.evaluation.point))
     if evaluation is None:
         return None
+    very_far = misfit(evaluation) > VERY_FAR
+    # Far from the noise first order tells of a push only where little else is wrong, and very far of none
+    likeliest = None if very_far else pulse()
+    if likeliest is not None and (near_noise(fitted) or chiefly(likeliest, fitted)):
+        promises = screen(problem, fitted.evaluation, catalogue(problem), mass_of(problem, fitted.evaluation))
+        pulsed = _pulsed(ideal, likeliest, promises, notify, budget)
+        if pulsed is not None:
+            return pulsed
     search = Search(problem, here, evaluation, excess(evaluation), budget)
     if search.whole:
         search.screened = promises
@@ -109,7 +112,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         calm = cache(partial(calm_pieces, here, evaluation))
         pushed = without_push(ideal, problem, here, evaluation, pulse, notify, calm)
         pushed = pushed or _beside_push(ideal, here, evaluation, notify, budget, calm)
-        if pushed is None and misfit(evaluation) > VERY_FAR:
+        if pushed is None and very_far:
             pushed = _beside_event(ideal, here, burst(here, evaluation), notify, budget)
         if pushed is not None:
             return pushed
@@ -152,7 +155,7 @@ def _pulsed(
     return None if rest is None else with_pulse(explain(rest, [], notify, budget), rest, ideal, pulse)
 
 
-def _gentle_push(ideal: Ideal, problem: Problem, pulse: Pulse | None, notify: Notify) -> Explained | None:
+def _gentle_push(ideal: Ideal, problem: Problem, pulse: Likeliest, notify: Notify) -> Explained | None:
     """A push so gentle that whole runs come near the noise with it."""
     here, evaluation = short_pieces(ideal) or (problem, None)
     return None if evaluation is None else without_push(ideal, problem, here, evaluation, pulse, notify)

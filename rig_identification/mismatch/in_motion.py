@@ -83,8 +83,12 @@ def unearned_of(
     residuals: Sequence[Array],
     spread: float = 0.0,
 ) -> float:
-    """The same of ``residuals``, in the rows of ``rows``. spread: nats gained in their log spreads."""
+    """The same of ``residuals``, in the rows of ``rows``. spread: nats gained in their log spreads.
+
+    What explains an excess leaves less of it in units of the noise. Less noise alone leaves as much of those,
+    and by chance there is always some excess.
+    """
     old = [run.residual for run in before.runs]
     beyond, white = _cost(problem.runs, before.runs, old, _fast)
-    gained = spread + beyond - _cost(problem.runs, rows, residuals, _fast)[0]
-    return max(0.0, gained - max(0.0, beyond - white))
+    fallen = beyond - _cost(problem.runs, rows, residuals, _fast)[0]
+    return max(0.0, spread + fallen - max(0.0, min(beyond - white, fallen)))

@@ -129,7 +129,7 @@ class _Pulses:
         self, problem: Problem, evaluation: Evaluation, beyond: Beyond, index: int, prior: Array
     ) -> None:
         self._beyond, self._prior = beyond, prior
-        self._index, self._runs = index, evaluation.runs
+        self._index, self._count = index, len(evaluation.runs)
         self._run, self._own = problem.runs[index], evaluation.runs[index]
         self._turned = self._own.motion.R_world_body.transpose(0, 2, 1)
         self._time = self._run.grid.step * (np.arange(self._turned.shape[0]) + 0.5)
@@ -204,11 +204,7 @@ class _Pulses:
             wrenches[:, :3, 6 * i : 6 * i + 3] = course
             wrenches[:, 3:, 6 * i + 3 : 6 * i + 6] = course
         own = whitened_response(self._own, wrenches)
-        rows = [
-            own if i == self._index else np.zeros((run.residual.size, own.shape[1]))
-            for i, run in enumerate(self._runs)
-        ]
-        columns = self._beyond.of(rows)
+        columns = self._beyond.of([own if i == self._index else None for i in range(self._count)])
         out = []
         for i, (begin, duration) in enumerate(pulses):
             six = slice(6 * i, 6 * i + 6)

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 Notify = Callable[[str, float], None]
 #: The pieces that an event leaves in peace, fitted when they are first asked for.
 Calmed = Callable[[], Calm | None]
+#: The likeliest push of whole runs, looked for when it is first asked for.
+Likeliest = Callable[[], Pulse | None]
 
 #: How uneven pieces must be (worst over median mean square) for an event to be looked for.
 UNEVEN = 4.0
@@ -57,13 +59,13 @@ def without_push(
     problem: Problem,
     here: Problem,
     evaluation: Evaluation,
-    pulse: Pulse | None,
+    likeliest: Likeliest,
     notify: Notify,
     calm: Calmed = nothing_known,
 ) -> Explained | None:
     """The session without the seconds in which something pushed; None where nothing did, or more is wrong.
 
-    problem: whole runs. here, evaluation: their short pieces, fitted. pulse: the likeliest push of all runs.
+    problem: whole runs. here, evaluation: their short pieces, fitted. likeliest: the push of all runs.
     calm: what is known of the pieces that a push leaves in peace.
     """
     if not _may_hold_an_event(evaluation):
@@ -72,6 +74,7 @@ def without_push(
     event = find_event(here, evaluation, calm=calm())
     if event is None:
         return None
+    pulse = likeliest()
     seen = pulse is not None and pulse.within(event.recording, event.start, event.end)
     if at_an_end(event, here) and not seen:
         # What begins or dies away shows there as well
