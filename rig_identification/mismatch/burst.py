@@ -20,9 +20,11 @@ Array = NDArray[np.float64]
 
 #: Seconds over which the wrench is averaged.
 BIN = 0.25
-#: A push holds this share of what is no constant in the wrench (its square), in so much of the time at most:
-#: what swings, rubs or lags takes the larger part of the time to come to as much.
-HELD, FOR = 0.9, 0.2
+#: A push stands out of the wrench at all other times by this factor (of its square), in one stretch of so
+#: much of the time at most: what swings, rubs or lags comes to as much again and again.
+STANDS_OUT, FOR = 5.0, 0.2
+#: Bins on either side of what stands out in which it may begin and end.
+ABOUT = 2
 
 
 def burst(problem: Problem, evaluation: Evaluation) -> Event | None:
@@ -42,21 +44,22 @@ def burst(problem: Problem, evaluation: Evaluation) -> Event | None:
         rows += [np.mean(part, axis=0) / size for part in np.array_split(latent, bins)]
         piece += [i] * bins
     wrench = np.array(rows)
-    squares = np.sum((wrench - np.median(wrench, axis=0)) ** 2, axis=1)
-    first, last = _shortest(squares)
-    names = {problem.runs[i].recording.name for i in piece[first:last]}
-    if last - first > FOR * squares.size or len(names) > 1:
+    stretch = standing_out(np.sum((wrench - np.median(wrench, axis=0)) ** 2, axis=1))
+    if stretch is None:
+        return None
+    names = [problem.runs[i].recording.name for i in piece]
+    first, last = stretch[0] - ABOUT, stretch[1] + ABOUT
+    if first < 0 or last > len(piece) or len(set(names[first:last])) > 1:
+        # What begins or dies away stands out at a recording's end as well
         return None
     bad = sorted(set(piece[first:last]))
     calm = tuple(i for i in range(len(problem.runs)) if i not in bad)
     start, end = problem.runs[bad[0]], problem.runs[bad[-1]]
-    return Event(names.pop(), start.offset, end.offset + end.grid.duration, evaluation.point, calm)
+    return Event(names[first], start.offset, end.offset + end.grid.duration, evaluation.point, calm)
 
 
-def _shortest(squares: Array) -> tuple[int, int]:
-    """First bin, and the one after the last, of the shortest stretch that holds ``HELD`` of the sum."""
-    total = np.concatenate([[0.0], np.cumsum(squares)])
-    ends = np.searchsorted(total, total[:-1] + HELD * total[-1])
-    lengths = np.where(ends < total.size, ends - np.arange(squares.size), total.size)
-    first = int(np.argmin(lengths))
-    return first, int(min(ends[first], squares.size))
+def standing_out(squares: Array) -> tuple[int, int] | None:
+    """First bin, and the one after the last, of the one stretch that stands out; None where none does."""
+    high = np.flatnonzero(squares > np.max(squares) / STANDS_OUT)
+    first, last = int(high[0]), int(high[-1]) + 1
+    return (first, last) if last - first <= FOR * squares.size else None
