@@ -1,4 +1,4 @@
-"""A push beside a rotor that the scale did not weigh, told by the wrench that the measured motion asks for."""
+"""A push beside a rotor that the scale did not weigh, told by the wrench that the motion asks for."""
 
 from __future__ import annotations
 
