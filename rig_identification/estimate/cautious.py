@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.rest_evidence import RestEvidence
-from rig_identification.estimate.solve import POLISH, Damping, Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.solve import (
+    PATIENCE,
+    POLISH,
+    Damping,
+    Evaluation,
+    Point,
+    Problem,
+    evaluate,
+    solve,
+)
 
 Array = NDArray[np.float64]
 
@@ -24,6 +33,8 @@ MOTION_BAND = 5.0
 #: Rounds of weighing and fitting, and steps of each fit.
 ROUNDS = 4
 STEPS = 4
+#: Evaluations that a step may take on average, of a fit whose weights are made anew after it.
+HASTY = 1.0
 
 
 Axis = tuple[str, str, int]  # device, quantity, axis
@@ -101,9 +112,16 @@ def solve_cautiously(parts: Problem, point: Point) -> tuple[Problem, Evaluation]
     for k in range(ROUNDS):
         weighed = reweighted(parts, current)
         # Weights are made anew: only the last of them are worth a fit to its end
-        polish = POLISH if k + 1 < ROUNDS else 0.0
+        last = k + 1 == ROUNDS
+        polish, patience = (0.0, PATIENCE) if last else (POLISH, HASTY)
         evaluation, _ = solve(
-            weighed, current.point, damped=damped, iterations=STEPS, tolerance=0.5, polish=polish
+            weighed,
+            current.point,
+            damped=damped,
+            iterations=STEPS,
+            tolerance=0.5,
+            polish=polish,
+            patience=patience,
         )
         current = evaluate(parts, evaluation.point, residuals_only=True) or current
     return weighed, evaluation

@@ -403,6 +403,7 @@ def solve(
     iterations: int = 30,
     tolerance: float = 1e-3,
     polish: float = 0.0,
+    patience: float = PATIENCE,
     bends: bool = False,
     notify: Callable[[int, float], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -417,7 +418,8 @@ def solve(
     win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count. Where ``stop`` says so the fit
-    ends after the step that it tries, unconverged. damped: what it begins with, and what it came to after.
+    ends after the step that it tries, unconverged. patience: evaluations that a step may take on average.
+    damped: what it begins with, and what it came to after.
     """
     damped = damped or Damping()
     current = evaluate(problem, point)
@@ -428,7 +430,7 @@ def solve(
         turned_back = False
         while True:
             damped.value = damping
-            if spent > PATIENCE * iterations:
+            if spent > patience * iterations:
                 return current, _as_good_as_settled(problem, current)
             # About as little damping failed last
             wary = damping <= 1.01 * BRAKED * failed
