@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit
 from rig_identification.estimate.rest_evidence import RestEvidence
 from rig_identification.estimate.solve import (
     PATIENCE,
@@ -109,15 +110,16 @@ def solve_cautiously(parts: Problem, point: Point) -> tuple[Problem, Evaluation]
     if current is None:
         return parts, solve(parts, point, iterations=ROUNDS * STEPS)[0]
     weighed, evaluation, damped = parts, current, Damping()
+    hopeless = misfit(current) > HOPELESS_SQUARE
     for k in range(ROUNDS):
         weighed = reweighted(parts, current)
-        # Weights are made anew: only the last of them are worth a fit to its end
-        last = k + 1 == ROUNDS
-        polish, patience = (0.0, PATIENCE) if last else (POLISH, HASTY)
+        # Weights are made anew: where no model fits only the last of them are worth a fit to its end
+        hasty = hopeless and k + 1 < ROUNDS
+        polish, patience = (POLISH, HASTY) if hasty else (0.0, PATIENCE)
         evaluation, _ = solve(
             weighed,
             current.point,
-            damped=damped,
+            damped=damped if hopeless else None,
             iterations=STEPS,
             tolerance=0.5,
             polish=polish,
