@@ -100,26 +100,25 @@ def _reweighted_rest(evidence: RestEvidence, predicted: tuple[Array, ...]) -> Re
     return replace(evidence, channels=tuple(channels))
 
 
-def solve_cautiously(parts: Problem, point: Point) -> tuple[Problem, Evaluation]:
+def solve_cautiously(parts: Problem, point: Point, *, hasty: bool = False) -> tuple[Problem, Evaluation]:
     """A fit in pieces (segments.in_pieces) weighed by the residuals themselves: the weighed problem, and it.
 
     Weights start from the residuals at ``point`` and follow them down, so that what the model
-    lacks is never large against the weights and bends nothing on the way.
+    lacks is never large against the weights and bends nothing on the way. hasty: where no model fits a search
+    goes on from here, and all but the last of the weights, which are made anew, are worth no fit to its end.
     """
     current = evaluate(parts, point, residuals_only=True)
     if current is None:
         return parts, solve(parts, point, iterations=ROUNDS * STEPS)[0]
     weighed, evaluation, damped = parts, current, Damping()
-    hopeless = misfit(current) > HOPELESS_SQUARE
+    hasty = hasty and misfit(current) > HOPELESS_SQUARE
     for k in range(ROUNDS):
         weighed = reweighted(parts, current)
-        # Weights are made anew: where no model fits only the last of them are worth a fit to its end
-        hasty = hopeless and k + 1 < ROUNDS
-        polish, patience = (POLISH, HASTY) if hasty else (0.0, PATIENCE)
+        polish, patience = (POLISH, HASTY) if hasty and k + 1 < ROUNDS else (0.0, PATIENCE)
         evaluation, _ = solve(
             weighed,
             current.point,
-            damped=damped if hopeless else None,
+            damped=damped if hasty else None,
             iterations=STEPS,
             tolerance=0.5,
             polish=polish,
