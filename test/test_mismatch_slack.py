@@ -13,12 +13,29 @@ from rig_identification.estimate.evidence import Run, heard_apart, prepare
 from rig_identification.mismatch.slack import (
     Spell,
     blows,
+    comes_after,
     quietened,
     shocks,
     slack_finding,
     slack_spells,
     taut_stretches,
 )
+from rig_identification.result import Finding, Mismatch
+
+
+def _found(verdict: str, *effects: str) -> Mismatch:
+    return Mismatch(verdict, "", tuple(Finding(effect, {}, {}, {}, "") for effect in effects), ())  # type: ignore[arg-type]
+
+
+def test_what_makes_a_cable_slack_is_told_before_the_slack() -> None:
+    both, none = {"taken": 7e9, "left_out": 12e9}, {"taken": 5.0, "left_out": 1e3}
+    assert comes_after(_found("explained", "cable_elasticity"), **both, fails=True)
+    assert comes_after(_found("unexplained", "cable_elasticity", "unknown"), **both, fails=True)
+    # Where every cable pulls next to nothing is left: what was found there stands beside the slack
+    assert not comes_after(_found("explained", "imu_bias"), **none, fails=False)
+    assert comes_after(_found("explained", "imu_bias"), taken=2e3, left_out=1e3, fails=False)
+    assert not comes_after(_found("unexplained", "unknown"), **both, fails=True)
+    assert not comes_after(_found("explained"), **both, fails=True)
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run, heard_apart
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.identify import Ideal, fit_again, judged
+from rig_identification.estimate.identify import Ideal, fit_again, judged, near_noise
 from rig_identification.estimate.rest_evidence import RestEvidence
 from rig_identification.estimate.rods import FEW, pushes, reads_nothing
 from rig_identification.estimate.solve import excess
@@ -208,6 +208,18 @@ def taut_ideal(ideal: Ideal, spells: list[Spell], notify: Notify) -> Ideal | Non
     return fit_again(ideal, runs, held, notify)
 
 
+def comes_after(mismatch: Mismatch, *, taken: float, left_out: float, fails: bool) -> bool:
+    """Whether slack is told after what was found between the spells.
+
+    taken: nats that what was found takes away. left_out: nats that the spells had. fails: whether the ideal
+    model fails by far where every cable pulls, too. What does that is no slack, and may be what makes it: a
+    body that bounces on cables that stretch lets go of them.
+    """
+    if not mismatch.findings or mismatch.findings[0].effect == "unknown":
+        return False
+    return fails or (mismatch.verdict == "explained" and taken > left_out)
+
+
 def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
     """What was found between the spells, and the spells."""
     before, after = ideal.scores.holdout, judged(found.fitted)[0].holdout
@@ -226,7 +238,7 @@ def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained
         fitted = found.ideal.fitted
         mismatch = Mismatch("explained", text, (), mismatch.alternatives)
         found = replace(found, fitted=fitted, loose=max(found.loose, hear(fitted).looseness))
-    # What takes most of what was left away comes first, be it into the model or out of the fit
-    last = mismatch.verdict == "explained" and taut - modelled > loose - taut
+    fails = not near_noise(found.ideal.fitted)
+    last = comes_after(mismatch, taken=taut - modelled, left_out=loose - taut, fails=fails)
     findings = (*mismatch.findings, slack) if last else (slack, *mismatch.findings)
     return replace(found, mismatch=replace(mismatch, findings=findings))
