@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.solve import Evaluation, Problem
-from rig_identification.mismatch.locate import Event
+from rig_identification.mismatch.locate import Event, event_in
 from rig_identification.mismatch.measured import driven
 from rig_identification.mismatch.trial import mass_of
 
@@ -52,10 +52,7 @@ def burst(problem: Problem, evaluation: Evaluation) -> Event | None:
     if first < 0 or last > len(piece) or len(set(names[first:last])) > 1:
         # What begins or dies away stands out at a recording's end as well
         return None
-    bad = sorted(set(piece[first:last]))
-    calm = tuple(i for i in range(len(problem.runs)) if i not in bad)
-    start, end = problem.runs[bad[0]], problem.runs[bad[-1]]
-    return Event(names[first], start.offset, end.offset + end.grid.duration, evaluation.point, calm)
+    return event_in(problem, sorted(set(piece[first:last])), evaluation.point)
 
 
 def standing_out(squares: Array) -> tuple[int, int] | None:

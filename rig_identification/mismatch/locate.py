@@ -195,10 +195,15 @@ def find_event(
     names = {problem.runs[i].recording.name for i in bad}
     if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
         return None
-    first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
-    peaceful = tuple(i for i in range(count) if i not in bad)
-    event = Event(names.pop(), first.offset, last.offset + last.grid.duration, point, peaceful)
+    event = event_in(problem, bad, point)
     return None if not alone and at_an_end(event, problem) else event
+
+
+def event_in(problem: Problem, bad: list[int], point: Point) -> Event:
+    """The event that takes the pieces ``bad`` of one recording, next to each other."""
+    first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
+    calm = tuple(i for i in range(len(problem.runs)) if i not in bad)
+    return Event(first.recording.name, first.offset, last.offset + last.grid.duration, point, calm)
 
 
 def at_an_end(event: Event, problem: Problem) -> bool:

@@ -215,9 +215,8 @@ def comes_after(mismatch: Mismatch, *, taken: float, left_out: float, fails: boo
     model fails by far where every cable pulls, too. What does that is no slack, and may be what makes it: a
     body that bounces on cables that stretch lets go of them.
     """
-    if not mismatch.findings or mismatch.findings[0].effect == "unknown":
-        return False
-    return fails or (mismatch.verdict == "explained" and taken > left_out)
+    named = bool(mismatch.findings) and mismatch.findings[0].effect != "unknown"
+    return (named and fails) or (mismatch.verdict == "explained" and taken > left_out)
 
 
 def with_slack(found: Explained, ideal: Ideal, spells: list[Spell]) -> Explained:
