@@ -17,6 +17,7 @@ from rig_identification.estimate.sampling import (
     node_input,
     node_values,
     noise_felt,
+    rate_noise,
     sample_noise_std,
     smoothed_input,
 )
@@ -105,6 +106,14 @@ def test_a_smoothed_swing_and_its_derivatives() -> None:
     np.testing.assert_allclose(smooth.at(0.0, 1)[20:-20], expected[20:-20], atol=0.001 * 2.0 * np.pi)
     expected = -((2.0 * np.pi) ** 2) * np.sin(2.0 * np.pi * at)
     np.testing.assert_allclose(smooth.at(0.0, 2)[20:-20], expected[20:-20], atol=0.002 * (2.0 * np.pi) ** 2)
+
+
+def test_rate_of_noise_has_the_variance_that_is_told() -> None:
+    grid = Grid(0.01, 40000)
+    noise = np.random.default_rng(5).normal(size=(grid.nodes, 1))
+    rate = smoothed_input(grid, noise).at(0.0, 1)
+    # 40000 nodes hold some 6000 that do not depend on each other: 4 standard deviations of a variance
+    assert np.var(rate) == pytest.approx(rate_noise(grid.step), rel=0.07)
 
 
 @pytest.mark.parametrize("late", [-0.08, -0.026, 0.003, 0.05])

@@ -50,6 +50,33 @@ def test_few_numbers_are_tried_before_a_hose(lag: float, gain: float, hose: floa
     assert [p.candidate.effect for p in along.worthy] == worthy
 
 
+def nested(share: float, curve: float) -> Along:
+    """A cell's zero, and its curve, which has the zero's number too: their shares of what is left."""
+    zero, bend = added("zero", "N", 1.0, 0), added("curve", "1/N", 1.0, 0)
+    return Along(
+        [
+            Promise(Candidate("curve", (zero, bend), "", ""), 1000.0 * curve, {}, curve),
+            Promise(Candidate("zero", (zero,), "", ""), 1000.0 * share, {}, share),
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "curve", "worthy", "sure"),
+    [
+        (0.73, 0.75, ["zero"], ["zero"]),  # what else there is bends the curve a little
+        (0.73, 0.95, ["curve", "zero"], ["curve"]),  # most of what the zero leaves
+        (0.45, 0.5, ["zero"], []),  # no more than half
+    ],
+)
+def test_a_number_that_takes_little_more_is_not_needed(
+    share: float, curve: float, worthy: list[str], sure: list[str]
+) -> None:
+    along = nested(share, curve)
+    assert [p.candidate.effect for p in along.worthy] == worthy
+    assert [p.candidate.effect for p in along.sure] == sure
+
+
 def quiet(stage: str, fraction: float) -> None:
     """No progress."""
 

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import ParameterSet
+from rig_identification.estimate.sampling import rate_noise
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
@@ -158,13 +159,16 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     """(N, 6, 6) covariance of the wrench held over each node interval that the force's error stands for.
 
     Three errors: the samples' noise, the moment of a jump, which lies anywhere between two nodes, and what
-    the force did where it was not sampled.
+    the force did where it was not sampled. Where a low-pass is undone the noise of the force's rate is added.
     """
     out = np.zeros((run.grid.nodes, 6, 6))
     if run.force is None or (run.exciter_noise == 0.0 and not np.any(run.force.doubt)):
         return out
     spread = exciter_wrench_map(parameters, theta)
-    held = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
+    tau = parameters.device(theta)[parameters.places.lag("exciter")]
+    held = (
+        run.exciter_noise**2 / (run.exciter_rate * run.grid.step) * (1.0 + tau**2 * rate_noise(run.grid.step))
+    )
     out[:] = (held + run.force.doubt)[:, None, None] * (spread @ spread.T)
     jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12

@@ -261,6 +261,16 @@ def smoothed_input(grid: Grid, nodes: Array) -> SmoothInput:
     return SmoothInput(CubicSpline(grid.step * np.arange(grid.nodes), twice), grid.step, 0, grid.nodes)
 
 
+def rate_noise(step: float) -> float:
+    """Variance (1/s2) of the smoothed input's rate, in that of the white noise of its nodes ``step`` apart.
+
+    Twicing a Gaussian of width s leaves H = 2 g - g^2 of a frequency w, g = exp(-(w s)^2 / 2), and the
+    integral of (w H)^2 over all of them is sqrt(pi)/4 (4 - 4 / 1.5^1.5 + 1 / 2^1.5) / s^3.
+    """
+    integral = np.sqrt(np.pi) / 4.0 * (4.0 - 4.0 / 1.5**1.5 + 1.0 / 2.0**1.5)
+    return float(integral / SMOOTHING**3 / (np.pi / step))
+
+
 #: Nodes between two of the samples whose weights are looked at: none reaches that far.
 APART = 40
 

@@ -17,7 +17,7 @@ from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.solve import Point, Problem, excess, shortened
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.first_fits import BEATEN, CLOSE
+from rig_identification.mismatch.first_fits import BEATEN, CLOSE, DIRECT
 from rig_identification.mismatch.measured import ENOUGH, driven
 from rig_identification.mismatch.screen import Promise, promises_of, screen, with_reference
 from rig_identification.mismatch.trial import Trial, mass_of
@@ -48,7 +48,35 @@ class Along:
         soon = [p for p in self.promises if not p.candidate.slow]
         best = max((p.gain for p in soon), default=0.0)
         soon = [p for p in soon if p.gain > CLOSE * best] if best > CHIEF * most else []
-        return [*soon[:FEW], *slow[:SLOW]]
+        return [*_needed(soon)[:FEW], *slow[:SLOW]]
+
+    @property
+    def sure(self) -> list[Promise]:
+        """Those that something beside them is looked for with at once.
+
+        They promise nearly all; or the larger part, and nothing else comes close.
+        """
+        worthy = self.worthy
+        least = CHIEF if len(worthy) == 1 else DIRECT
+        return [p for p in worthy if p.share > least]
+
+
+def _needed(promises: list[Promise]) -> list[Promise]:
+    """Those of ``promises`` all of whose numbers are needed.
+
+    A cell's curve has its zero's number and more of its own: these are worth a fit where they promise the
+    larger part of what the zero leaves. What is beside the zero bends them all, to a little of that.
+    """
+    names = [{q.name for q in p.candidate.parameters} for p in promises]
+
+    def needless(k: int) -> bool:
+        share = promises[k].share
+        return any(
+            own < names[k] and share - p.share < CHIEF * (1.0 - p.share)
+            for p, own in zip(promises, names, strict=True)
+        )
+
+    return [p for k, p in enumerate(promises) if not needless(k)]
 
 
 def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:

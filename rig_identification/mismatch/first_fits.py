@@ -243,6 +243,9 @@ def leading(
         if best is not None and trial.candidate.build is not None:
             # What changes the model and is fitted slowly may bend to anything
             break
+        if budget.spent():
+            # What is fitted no further leaves something
+            break
         if ended.get(trial.candidate.label, np.inf) <= excess(trial.evaluation):
             # From elsewhere the same one came to less: this is on its way there
             continue

@@ -58,6 +58,8 @@ from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, 
 FINISHED = 3
 #: What gives way or swings that is tried before changes of numbers which promise less.
 AT_ONCE = 3
+#: Promises as good as the best that are fitted beside what is certain.
+ALIKE = 2
 
 
 @dataclass
@@ -188,7 +190,7 @@ class Look:
                     if at_noise(trial) or almost(trial, self.seen):
                         break
         if along.beyond and not self.enough and not self.almost:
-            sure = {p.candidate.label for p in along.worthy if p.share > DIRECT}
+            sure = {p.candidate.label for p in along.sure}
             self.certain = self._contradicting([t for t in self.tried if t.candidate.label in sure])
 
     def _contradicting(self, told: list[Trial]) -> list[Trial]:
@@ -285,11 +287,18 @@ class Look:
         self.notify(f"{ended[0].candidate.label}, and one more")
         others = compatible(self.candidates, [ended[0].candidate])
         promises = screen(ended[0].problem, ended[0].evaluation, others, self.mass)
-        stretched = stretching(ended[0].problem, ended[0].evaluation, self.mass)
-        promises += [] if stretched is None else [stretched]
-        promised = max(promises, key=lambda p: p.gain, default=None)
-        if promised is not None and promised.share >= DIRECT:
-            return self._leaving_nothing(ended, promised)
+        if not promises or promises[0].candidate.slow or promises[0].share < DIRECT:
+            stretched = stretching(ended[0].problem, ended[0].evaluation, self.mass)
+            promises += [] if stretched is None else [stretched]
+            promises.sort(key=lambda p: -p.gain)
+        sure = [p for p in promises if p.share >= DIRECT and p.gain > promises[0].gain - BEATEN]
+        for promised in sure[:ALIKE]:
+            # A clock and a lag promise the same, and one of them leaves nothing
+            found = self._leaving_nothing(ended, promised)
+            if found:
+                return found
+        if sure:
+            return []
         if misfit(ended[0].evaluation) > VERY_FAR and not self.budget.spent():
             for promise in along_beside(ended[0], others, self.mass).worthy:
                 found = self._leaving_nothing(ended, promise)
