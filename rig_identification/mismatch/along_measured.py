@@ -5,7 +5,8 @@ about it is hardly worth more than a guess: of twenty hypotheses each takes abou
 was measured is another matter (measured.py). Along it the missing wrench is known, and of what it is made
 up, dry hinges or a hose, is a regression. So is what is wrong with a device: a wrench bends the motion and
 each of the other devices sees that, so that an error of one is told by its own numbers for less. Where no
-wrench leaves only noise nothing that acts on the body would do so, and devices and rig alone are looked at.
+wrench leaves only noise nothing that acts on the body would do so, and devices and rig alone are looked at,
+and cables that stretch (stretched.py).
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from dataclasses import dataclass, replace
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.solve import Point, Problem, excess, shortened
+from rig_identification.estimate.solve import Evaluation, Point, Problem, excess, shortened
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.first_fits import BEATEN, CLOSE, DIRECT
 from rig_identification.mismatch.measured import ENOUGH, driven
 from rig_identification.mismatch.screen import Promise, promises_of, screen, with_reference
+from rig_identification.mismatch.stretched import stretched_along
 from rig_identification.mismatch.trial import Trial, mass_of
 
 #: Seconds of each run that are looked at: along a known motion nothing adds up, and they have it all.
@@ -91,7 +93,7 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:
         if all(run.begins in begun for run in problem.runs):
             starts = tuple(begun[run.begins] for run in problem.runs)
             point = replace(point, theta=there.theta, starts=starts)
-    return _along(problem, point, candidates, mass_of(problem, fitted.evaluation))
+    return _along(problem, point, fitted.evaluation, candidates, mass_of(problem, fitted.evaluation))
 
 
 def along_beside(first: Trial, candidates: list[Candidate], mass: float) -> Along:
@@ -99,10 +101,12 @@ def along_beside(first: Trial, candidates: list[Candidate], mass: float) -> Alon
 
     A fit with one effect of two is as far out of step as the ideal model's.
     """
-    return _along(first.problem, first.evaluation.point, candidates, mass)
+    return _along(first.problem, first.evaluation.point, first.evaluation, candidates, mass)
 
 
-def _along(problem: Problem, point: Point, candidates: list[Candidate], mass: float) -> Along:
+def _along(
+    problem: Problem, point: Point, evaluation: Evaluation, candidates: list[Candidate], mass: float
+) -> Along:
     """Promises about the motion that was measured, from a point of a problem."""
     seen = driven(problem, point, mass)
     if seen is None:
@@ -112,6 +116,9 @@ def _along(problem: Problem, point: Point, candidates: list[Candidate], mass: fl
     promises = promises_of(*seen, [c for c in candidates if not acts(c)])
     left = max(1.0, excess(seen[1]))
     promises = [replace(p, share=p.gain / left) for p in promises]
+    stretched = stretched_along(problem, point, evaluation, mass)
+    if stretched is not None:
+        promises.append(replace(stretched, gain=stretched.share * left))
     return Along(sorted(promises, key=lambda p: -p.gain), beyond=True)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rig_identification.estimate.solve import excess, solve, still_promised
 from rig_identification.mismatch.amounts import CHIEF
-from rig_identification.mismatch.first_fits import BEATEN, RIVAL, at_noise
+from rig_identification.mismatch.first_fits import BEATEN, RIVAL, at_noise, shows
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.look import FINISHED, Look
 from rig_identification.mismatch.outcome import MEANT, Trials
@@ -114,10 +114,15 @@ def _fair(look: Look, trial: Trial) -> Trial:
 def _missed(look: Look, trial: Trial) -> bool:
     """Whether more is left without a trial, about where it ends.
 
+    Of what no residual shows something of many numbers is told by its amount alone: a hose that may as well
+    be none bends to cables that resist twist, and explains them within the noise.
+
     Far along a curved valley an amount's std says little of how clear of none it lies: of a part on springs
     little but its mass times its place shows. What changes the model bends to more than numbers do, and has
     to beat none of it for good.
     """
+    if trial.candidate.many and not shows(look.seen):
+        return False
     if trial.candidate.build is not None:
         return trial.evidence > log_evidence(look.seen) + BEATEN
     point = carried(look.here, trial.problem, trial.evaluation.point)

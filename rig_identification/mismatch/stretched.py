@@ -1,0 +1,76 @@
+"""Cables that stretch, told by the motion that was measured where the ideal model fails by far.
+
+Cables that stretch by centimetres ring, and no fit without them follows: what first order promises of them
+about such a fit is worth nothing. Along the measured motion (measured.py) a random wrench stands for what
+the model lacks, and yet not for this: load cells and accelerometers contradict each other by as much as the
+cables give. At the right stiffness they agree, at half or twice of it they do not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rig_identification.estimate.growing import misfit
+from rig_identification.estimate.solve import Evaluation, Point, Problem, excess, shortened
+from rig_identification.mismatch.amounts import CHIEF
+from rig_identification.mismatch.measured import driven
+from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.supports import cable_elasticity, gives_way, usual_stiffness
+from rig_identification.mismatch.trial import VERY_FAR, promised
+
+#: Seconds of each run that are looked at, and stiffnesses, in the usual one, that are tried: from the softest
+#: by which a body in a laboratory hangs to where other witnesses tell.
+LOOKED_AT = 4.0
+STIFFNESSES = tuple(float(v) for v in np.geomspace(0.04, 4.0, 6))
+#: Share that one of two neighbours takes away at least where the right stiffness lies between them, and the
+#: share that is the right one's: a fit comes to it from half or twice of it.
+TRACE, ENOUGH = 0.1, 0.9
+
+
+def stretched_along(problem: Problem, point: Point, evaluation: Evaluation, mass: float) -> Promise | None:
+    """Cables that stretch, at their best stiffness along the measured motion; None where they explain little.
+
+    evaluation: of the problem's fit, or of one on other stretches of its runs. mass: kg, roughly.
+    """
+    model = problem.bench.parameters.model
+    if gives_way(model):
+        return None
+    short = shortened(problem, LOOKED_AT)
+    rigid = driven(short, point, mass)
+    if rigid is None or misfit(rigid[1]) < VERY_FAR:
+        return None
+    candidate = cable_elasticity(problem.bench.rig, model, mass)
+    name = candidate.parameters[0].name
+    wide, left = extended(short, (candidate,)), excess(rigid[1])
+    usual = usual_stiffness(problem.bench.rig, mass)
+    taken: dict[int, float] = {}  # share of what is left without, by stiffness
+
+    def ask(k: int) -> None:
+        if k in taken or not 0 <= k < len(STIFFNESSES):
+            return
+        start = carried(wide, short, point)
+        try:
+            there = promised(wide, start, candidate, {name: usual * STIFFNESSES[k]}, evaluation)
+            soft = driven(wide, there, mass)
+        except FloatingPointError:
+            soft = None
+        taken[k] = 0.0 if soft is None else 1.0 - excess(soft[1]) / left
+
+    def best() -> int:
+        return max(taken, key=lambda k: taken[k])
+
+    # Every other one shows whether there is anything between its neighbours
+    for k in (2, 4, 0):
+        ask(k)
+        if taken[k] > ENOUGH:
+            break
+    if TRACE < taken[best()] < ENOUGH:
+        middle = best()
+        ask(middle + 1)
+        ask(middle - 1)
+    share = taken[best()]
+    return (
+        Promise(candidate, share * left, {name: usual * STIFFNESSES[best()]}, share)
+        if share > CHIEF
+        else None
+    )
