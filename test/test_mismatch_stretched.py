@@ -30,7 +30,7 @@ def test_soft_cables_are_told_from_far_off(softness: float) -> None:
     stiffness = softness * usual_stiffness(problem.bench.rig, mass)
     problem, evaluation = _soft(stiffness)
     assert misfit(evaluation) > VERY_FAR
-    promise = stretched_along(problem, evaluation.point, evaluation, mass)
+    promise = stretched_along(problem, evaluation, mass)
     assert promise is not None
     assert promise.share > ENOUGH
     told = promise.values["cable.axial_stiffness"] / stiffness
@@ -42,11 +42,12 @@ def test_soft_cables_are_told_from_far_off(softness: float) -> None:
     found = trial.problem.bench.parameters.named(trial.evaluation.point.theta)
     assert found["cable.axial_stiffness"] == pytest.approx(stiffness, rel=0.01)
     # With them in the model there is nothing to ask any more
-    assert stretched_along(trial.problem, trial.evaluation.point, trial.evaluation, mass) is None
+    assert stretched_along(trial.problem, trial.evaluation, mass) is None
 
 
 def test_a_gyroscope_that_is_off_does_not_look_like_soft_cables() -> None:
     fitted = fit_session(_off(0.05, {}), lambda stage, share: None)
+    assert fitted.guess is not None
     problem = with_reference(fitted.problem, fitted.rest)
     mass = mass_of(problem, fitted.evaluation)
-    assert stretched_along(problem, fitted.evaluation.point, fitted.evaluation, mass) is None
+    assert stretched_along(problem, fitted.evaluation, mass, fitted.guess.theta) is None

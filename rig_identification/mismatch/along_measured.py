@@ -11,11 +11,13 @@ and cables that stretch (stretched.py).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.solve import Evaluation, Point, Problem, excess, shortened
+from rig_identification.estimate.solve import Point, Problem, excess, shortened
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.first_fits import BEATEN, CLOSE, DIRECT
@@ -93,7 +95,9 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:
         if all(run.begins in begun for run in problem.runs):
             starts = tuple(begun[run.begins] for run in problem.runs)
             point = replace(point, theta=there.theta, starts=starts)
-    return _along(problem, point, fitted.evaluation, candidates, mass_of(problem, fitted.evaluation))
+    guess = None if fitted.guess is None else fitted.guess.theta
+    stretch = partial(stretched_along, problem, fitted.evaluation, mass_of(problem, fitted.evaluation), guess)
+    return _along(problem, point, stretch, candidates, mass_of(problem, fitted.evaluation))
 
 
 def along_beside(first: Trial, candidates: list[Candidate], mass: float) -> Along:
@@ -101,13 +105,18 @@ def along_beside(first: Trial, candidates: list[Candidate], mass: float) -> Alon
 
     A fit with one effect of two is as far out of step as the ideal model's.
     """
-    return _along(first.problem, first.evaluation.point, first.evaluation, candidates, mass)
+    stretch = partial(stretched_along, first.problem, first.evaluation, mass)
+    return _along(first.problem, first.evaluation.point, stretch, candidates, mass)
 
 
 def _along(
-    problem: Problem, point: Point, evaluation: Evaluation, candidates: list[Candidate], mass: float
+    problem: Problem,
+    point: Point,
+    stretch: Callable[[], Promise | None],
+    candidates: list[Candidate],
+    mass: float,
 ) -> Along:
-    """Promises about the motion that was measured, from a point of a problem."""
+    """Promises about the motion that was measured, from a point of a problem; stretch: of its cables."""
     seen = driven(problem, point, mass)
     if seen is None:
         return Along([])
@@ -116,7 +125,7 @@ def _along(
     promises = promises_of(*seen, [c for c in candidates if not acts(c)])
     left = max(1.0, excess(seen[1]))
     promises = [replace(p, share=p.gain / left) for p in promises]
-    stretched = stretched_along(problem, point, evaluation, mass)
+    stretched = stretch()
     if stretched is not None:
         promises.append(replace(stretched, gain=stretched.share * left))
     return Along(sorted(promises, key=lambda p: -p.gain), beyond=True)

@@ -8,34 +8,45 @@ cables give. At the right stiffness they agree, at half or twice of it they do n
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.solve import Evaluation, Point, Problem, excess, shortened
+from rig_identification.estimate.solve import Evaluation, Problem, excess, shortened
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.measured import driven
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.supports import cable_elasticity, gives_way, usual_stiffness
 from rig_identification.mismatch.trial import VERY_FAR, promised
+from rig_identification.mismatch.unbent import at_first
 
-#: Seconds of each run that are looked at, and stiffnesses, in the usual one, that are tried: from the softest
-#: by which a body in a laboratory hangs to where other witnesses tell.
-LOOKED_AT = 4.0
+#: Seconds of each of the first runs that are looked at, and stiffnesses, in the usual one, that are tried:
+#: from the softest by which a body in a laboratory hangs to where other witnesses tell.
+LOOKED_AT, RUNS = 4.0, 2
 STIFFNESSES = tuple(float(v) for v in np.geomspace(0.04, 4.0, 6))
 #: Share that one of two neighbours takes away at least where the right stiffness lies between them, and the
 #: share that is the right one's: a fit comes to it from half or twice of it.
 TRACE, ENOUGH = 0.1, 0.9
 
 
-def stretched_along(problem: Problem, point: Point, evaluation: Evaluation, mass: float) -> Promise | None:
+def stretched_along(
+    problem: Problem, evaluation: Evaluation, mass: float, guess: NDArray[np.float64] | None = None
+) -> Promise | None:
     """Cables that stretch, at their best stiffness along the measured motion; None where they explain little.
 
-    evaluation: of the problem's fit, or of one on other stretches of its runs. mass: kg, roughly.
+    evaluation: of the problem's runs, longer maybe. mass: kg, roughly. guess: (p,) parameters where the ideal
+    model's fit began; from where a fit without them went rigid cables come nearer than those that stretch.
     """
     model = problem.bench.parameters.model
     if gives_way(model):
         return None
-    short = shortened(problem, LOOKED_AT)
+    short = shortened(replace(problem, runs=problem.runs[:RUNS]), LOOKED_AT)
+    about = evaluation.point
+    point = replace(about, starts=about.starts[:RUNS], latents=())
+    first = None if guess is None else at_first(short, evaluation, guess)
+    point = point if first is None else first.point
     rigid = driven(short, point, mass)
     if rigid is None or misfit(rigid[1]) < VERY_FAR:
         return None
