@@ -66,6 +66,7 @@ def nested(share: float, curve: float) -> Along:
     [
         (0.73, 0.75, ["zero"], ["zero"]),  # what else there is bends the curve a little
         (0.73, 0.95, ["curve", "zero"], ["curve"]),  # most of what the zero leaves
+        (3.4781, 3.4783, ["zero"], ["zero"]),  # more than there is, to first order
         (0.45, 0.5, ["zero"], []),  # no more than half
     ],
 )

@@ -69,14 +69,15 @@ def _needed(promises: list[Promise]) -> list[Promise]:
     """Those of ``promises`` all of whose numbers are needed.
 
     A cell's curve has its zero's number and more of its own: these are worth a fit where they promise the
-    larger part of what the zero leaves. What is beside the zero bends them all, to a little of that.
+    larger part of what the zero leaves. What is beside the zero bends them all, to a little of that; and where
+    it promises all, a tenth more is no reason.
     """
     names = [{q.name for q in p.candidate.parameters} for p in promises]
 
     def needless(k: int) -> bool:
         share = promises[k].share
         return any(
-            own < names[k] and share - p.share < CHIEF * (1.0 - p.share)
+            own < names[k] and share - p.share < CHIEF * max(1.0 - p.share, 1.0 - DIRECT)
             for p, own in zip(promises, names, strict=True)
         )
 
@@ -119,7 +120,9 @@ def _along(
     """Promises about the motion that was measured, from a point of a problem; stretch: of its cables."""
     seen = driven(problem, point, mass)
     if seen is None:
-        return Along([])
+        # On rigid cables the motion cannot even be followed
+        stretched = stretch()
+        return Along([] if stretched is None else [stretched], beyond=True)
     if misfit(seen[1]) <= ENOUGH:
         return Along(screen(*seen, candidates, mass))
     promises = promises_of(*seen, [c for c in candidates if not acts(c)])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.solve import Evaluation, Problem, excess, shortened
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, shortened
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.measured import driven
 from rig_identification.mismatch.screen import Promise, carried, extended
@@ -42,13 +42,15 @@ def stretched_along(
     model = problem.bench.parameters.model
     if gives_way(model):
         return None
-    short = shortened(replace(problem, runs=problem.runs[:RUNS]), LOOKED_AT)
-    about = evaluation.point
-    point = replace(about, starts=about.starts[:RUNS], latents=())
-    first = None if guess is None else at_first(short, evaluation, guess)
-    point = point if first is None else first.point
-    rigid = driven(short, point, mass)
-    if rigid is None or misfit(rigid[1]) < VERY_FAR:
+    # How a body hangs is guessed where it is let go, and not amid its swing
+    runs = problem.runs if guess is None else [r for r in problem.runs if r.begins[1] == 0.0]
+    short = shortened(replace(problem, runs=tuple(runs[:RUNS])), LOOKED_AT)
+    point = replace(evaluation.point, starts=evaluation.point.starts[:RUNS], latents=())
+    about = None
+    if runs:
+        about = evaluate(short, point) if guess is None else at_first(short, evaluation, guess)
+    rigid = None if about is None else driven(short, about.point, mass)
+    if about is None or rigid is None or misfit(rigid[1]) < VERY_FAR:
         return None
     candidate = cable_elasticity(problem.bench.rig, model, mass)
     name = candidate.parameters[0].name
@@ -59,9 +61,9 @@ def stretched_along(
     def ask(k: int) -> None:
         if k in taken or not 0 <= k < len(STIFFNESSES):
             return
-        start = carried(wide, short, point)
+        start = carried(wide, short, about.point)
         try:
-            there = promised(wide, start, candidate, {name: usual * STIFFNESSES[k]}, evaluation)
+            there = promised(wide, start, candidate, {name: usual * STIFFNESSES[k]}, about)
             soft = driven(wide, there, mass)
         except FloatingPointError:
             soft = None
