@@ -69,7 +69,7 @@ def _needed(promises: list[Promise]) -> list[Promise]:
     """Those of ``promises`` all of whose numbers are needed.
 
     A cell's curve has its zero's number and more of its own: these are worth a fit where they promise the
-    larger part of what the zero leaves. What is beside the zero bends them all, to a little of that; and where
+    larger part of what the zero leaves. What is beside the zero bends them all, to a little of that. Where
     it promises all, a tenth more is no reason.
     """
     names = [{q.name for q in p.candidate.parameters} for p in promises]
