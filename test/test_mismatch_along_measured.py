@@ -78,6 +78,13 @@ def test_a_number_that_takes_little_more_is_not_needed(
     assert [p.candidate.effect for p in along.sure] == sure
 
 
+def test_cables_that_stretch_have_shown_what_a_device_promises() -> None:
+    soft = Candidate("soft", (added("soft", "N", 1.0, 0),), "", "", build=lambda model: (model, ()))
+    promises = [promise("gain", 3000.0), Promise(soft, 970.0, {}, 0.97)]
+    assert [p.candidate.effect for p in Along(promises, beyond=True).worthy] == ["soft"]
+    assert [p.candidate.effect for p in Along(promises).worthy] == ["gain"]
+
+
 def quiet(stage: str, fraction: float) -> None:
     """No progress."""
 

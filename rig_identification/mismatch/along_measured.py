@@ -43,8 +43,12 @@ class Along:
     def worthy(self) -> list[Promise]:
         """Those that are worth a fit, what has a few numbers first.
 
-        That is fitted in a second; a hose takes many, and bends to what is none.
+        That is fitted in a second; a hose takes many, and bends to what is none. Cables that stretch have
+        shown how much they take; of a device first order far from the noise promises more than there is.
         """
+        shown = [p for p in self.promises if p.candidate.build is not None and p.share > DIRECT]
+        if self.beyond and shown:
+            return shown[:1]
         most = max((p.gain for p in self.promises), default=0.0)
         if most < BEATEN:
             return []
