@@ -166,9 +166,8 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
         return out
     spread = exciter_wrench_map(parameters, theta)
     tau = parameters.device(theta)[parameters.places.lag("exciter")]
-    held = (
-        run.exciter_noise**2 / (run.exciter_rate * run.grid.step) * (1.0 + tau**2 * rate_noise(run.grid.step))
-    )
+    step = run.grid.step
+    held = run.exciter_noise**2 / (run.exciter_rate * step) * (1.0 + tau**2 * rate_noise(step))
     out[:] = (held + run.force.doubt)[:, None, None] * (spread @ spread.T)
     jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12

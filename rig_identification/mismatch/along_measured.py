@@ -101,8 +101,9 @@ def along_measured(ideal: Ideal, candidates: list[Candidate]) -> Along:
             starts = tuple(begun[run.begins] for run in problem.runs)
             point = replace(point, theta=there.theta, starts=starts)
     guess = None if fitted.guess is None else fitted.guess.theta
-    stretch = partial(stretched_along, problem, fitted.evaluation, mass_of(problem, fitted.evaluation), guess)
-    return _along(problem, point, stretch, candidates, mass_of(problem, fitted.evaluation))
+    mass = mass_of(problem, fitted.evaluation)
+    stretch = partial(stretched_along, problem, fitted.evaluation, mass, guess)
+    return _along(problem, point, stretch, candidates, mass)
 
 
 def along_beside(first: Trial, candidates: list[Candidate], mass: float) -> Along:

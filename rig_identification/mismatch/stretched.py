@@ -59,7 +59,7 @@ def stretched_along(
     taken: dict[int, float] = {}  # share of what is left without, by stiffness
 
     def ask(k: int) -> None:
-        if k in taken or not 0 <= k < len(STIFFNESSES):
+        if not 0 <= k < len(STIFFNESSES):
             return
         start = carried(wide, short, about.point)
         try:
