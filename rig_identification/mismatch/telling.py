@@ -114,16 +114,12 @@ def _fair(look: Look, trial: Trial) -> Trial:
 def _missed(look: Look, trial: Trial) -> bool:
     """Whether more is left without a trial, about where it ends.
 
-    Of what no residual shows something of many numbers is told by its amount alone: a hose that may as well
-    be none bends to cables that resist twist, and explains them within the noise.
-
     Far along a curved valley an amount's std says little of how clear of none it lies: of a part on springs
     little but its mass times its place shows. What changes the model bends to more than numbers do, and has
-    to beat none of it for good.
+    to beat none of it for good. So has what has many numbers where no residual shows anything: a hose that
+    may as well be none bends to cables that resist twist, and explains them within the noise.
     """
-    if trial.candidate.many and not shows(look.seen):
-        return False
-    if trial.candidate.build is not None:
+    if trial.candidate.build is not None or (trial.candidate.many and not shows(look.seen)):
         return trial.evidence > log_evidence(look.seen) + BEATEN
     point = carried(look.here, trial.problem, trial.evaluation.point)
     try:
