@@ -9,6 +9,7 @@ form (model/body.py), with no prior of their own.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from rig_identification.model.body import (
     elements_from_linear,
     linear_from_elements,
     linear_from_log_cholesky,
+    linear_in_log_cholesky,
     log_cholesky_from_linear,
 )
 from rig_identification.model.integrate import EXCITER_CLOCK
@@ -69,6 +71,11 @@ class Parameter:
     def slope(self, position: float) -> float:
         """Derivative of :meth:`value`."""
         return self.prior_std * (self.value(position) if self.ratio else 1.0)
+
+
+#: Numbers and axes of the devices that are no load cell, in the order in which they stand.
+_SIZES = {"imu": devices.IMU_SIZE, "inclinometer": devices.INCLINOMETER_SIZE, "mocap": devices.MOCAP_SIZE}
+_AXES = {"imu": 6, "inclinometer": 2, "mocap": 0}
 
 
 @dataclass(frozen=True)
@@ -129,47 +136,44 @@ class DeviceLayout:
 
     def first(self, device: str) -> int:
         """First entry of a device's numbers."""
-        match device:
-            case "imu":
-                return self.imu
-            case "inclinometer":
-                return self.inclinometer
-            case "mocap":
-                return self.mocap
-        return self.load_cell(device)
+        return self._firsts[device] if device in self._firsts else self.load_cell(device)
 
     def _size(self, device: str) -> int:
-        fixed = {
-            "imu": devices.IMU_SIZE,
-            "inclinometer": devices.INCLINOMETER_SIZE,
-            "mocap": devices.MOCAP_SIZE,
-        }
-        return fixed[device] if device in fixed else devices.load_cell_size(len(self.cables))
+        return _SIZES[device] if device in _SIZES else devices.load_cell_size(len(self.cables))
 
     def _end(self, device: str) -> int:
         """Entry after a device's numbers and its drift."""
-        axes = {"imu": 6, "inclinometer": 2, "mocap": 0}.get(device, 1)
-        return self.first(device) + self._size(device) + devices.DRIFT_SIZE * axes
+        return self.first(device) + self._size(device) + devices.DRIFT_SIZE * _AXES.get(device, 1)
+
+    @cached_property
+    def _firsts(self) -> dict[str, int]:
+        """First entry of each device that is no load cell; behind each lies its clock offset."""
+        out, entry = {}, self._a_cell * len(self.cables)
+        for device, size in _SIZES.items():
+            out[device] = entry
+            entry += size + devices.DRIFT_SIZE * _AXES[device] + 1
+        out["exciter"] = entry
+        return out
 
     @property
     def imu(self) -> int:
         """First entry of the IMU: its numbers (model/sensors.py), its drift, its clock offset."""
-        return self._a_cell * len(self.cables)
+        return self._firsts["imu"]
 
     @property
     def inclinometer(self) -> int:
         """First entry of the inclinometer: its numbers, its drift, its clock offset."""
-        return self._end("imu") + 1
+        return self._firsts["inclinometer"]
 
     @property
     def mocap(self) -> int:
         """First entry of motion capture: 12 numbers, then its clock offset."""
-        return self._end("inclinometer") + 1
+        return self._firsts["mocap"]
 
     @property
     def exciter_clock(self) -> int:
         """Entry of the exciter's clock offset."""
-        return self.mocap + devices.MOCAP_SIZE + 1
+        return self._firsts["exciter"]
 
     @property
     def size(self) -> int:
@@ -178,13 +182,11 @@ class DeviceLayout:
 
     def clock(self, device: str) -> int:
         """Entry of a device's clock offset."""
-        fixed = {
-            "imu": self._end("imu"),
-            "inclinometer": self._end("inclinometer"),
-            "mocap": self._end("mocap"),
-            "exciter": self.exciter_clock,
-        }
-        return fixed[device] if device in fixed else self.exciter_clock + 1 + self.cables.index(device)
+        if device == "exciter":
+            return self.exciter_clock
+        if device in _SIZES:
+            return self._end(device)
+        return self.exciter_clock + 1 + self.cables.index(device)
 
     def lag(self, device: str) -> int:
         """Entry of a device's time constant (s) as a first-order low-pass."""
@@ -335,7 +337,30 @@ class ParameterSet:
 
     def values(self, theta: Array) -> Array:
         """Free parameters in their own units."""
-        return np.array([p.value(t) for p, t in zip(self.free, theta[INERTIAL:], strict=True)])
+        nominal, std, ratio = self._scales
+        moved = std * theta[INERTIAL:]
+        return np.where(ratio, nominal * np.exp(np.where(ratio, moved, 0.0)), nominal + moved)
+
+    @cached_property
+    def _scales(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Nominal, prior_std and ratio of each free parameter."""
+        return (
+            np.array([p.nominal for p in self.free]),
+            np.array([p.prior_std for p in self.free]),
+            np.array([p.ratio for p in self.free], dtype=bool),
+        )
+
+    @cached_property
+    def _entries(self) -> dict[str, tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """By kind of array: which free parameter is written where."""
+        out = {}
+        for kind in ("physics", "device"):
+            written = [
+                (i, entry) for i, p in enumerate(self.free) if p.kind == kind for entry in (p.index, *p.also)
+            ]
+            pairs = np.array(written, dtype=np.int64).reshape(-1, 2)
+            out[kind] = pairs[:, 0], pairs[:, 1]
+        return out
 
     def named(self, theta: Array) -> dict[str, float]:
         """Free parameters in their own units, by name."""
@@ -345,9 +370,8 @@ class ParameterSet:
         """The forward model's flat array."""
         physics: Array = self.model.physics.copy()
         physics[layout.INERTIAL : layout.INERTIAL + INERTIAL] = linear_from_log_cholesky(theta[:INERTIAL])
-        for p, value in zip(self.free, self.values(theta), strict=True):
-            if p.kind == "physics":
-                physics[[p.index, *p.also]] = value
+        which, entries = self._entries["physics"]
+        physics[entries] = self.values(theta)[which]
         tilt = physics[layout.GRAVITY : layout.GRAVITY + 2]
         gravity = -self.model.physics[layout.GRAVITY + 2]
         physics[layout.GRAVITY + 2] = -np.sqrt(gravity**2 - tilt @ tilt)
@@ -356,13 +380,16 @@ class ParameterSet:
     def device(self, theta: Array) -> Array:
         """The devices' flat array (:class:`DeviceLayout`)."""
         device = np.zeros(self.places.size)
-        for p, value in zip(self.free, self.values(theta), strict=True):
-            if p.kind == "device":
-                device[[p.index, *p.also]] = value
+        which, entries = self._entries["device"]
+        device[entries] = self.values(theta)[which]
         return device
 
     def directions(self) -> NDArray[np.int64]:
         """Entries of ``physics`` that any parameter moves, and the exciter's clock where it is free."""
+        return self._directions
+
+    @cached_property
+    def _directions(self) -> NDArray[np.int64]:
         moved = set(range(layout.INERTIAL, layout.INERTIAL + INERTIAL))
         moved |= {entry for p in self.free if p.kind == "physics" for entry in (p.index, *p.also)}
         if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
@@ -375,7 +402,7 @@ class ParameterSet:
         directions = self.directions()
         row_of = {int(d): r for r, d in enumerate(directions)}
         out = np.zeros((directions.size, self.size))
-        inertial = complex_step_jacobian(linear_from_log_cholesky, theta[:INERTIAL])
+        inertial = linear_in_log_cholesky(theta[:INERTIAL])
         for i in range(INERTIAL):
             out[row_of[layout.INERTIAL + i], :INERTIAL] = inertial[i]
         physics = self.physics(theta)
@@ -392,15 +419,8 @@ class ParameterSet:
 
     def device_columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(columns of the vector, entries of ``device``, scale) of the device parameters."""
-        rows = [
-            (INERTIAL + i, entry, p.prior_std)
-            for i, p in enumerate(self.free)
-            if p.kind == "device"
-            for entry in (p.index, *p.also)
-        ]
-        columns = np.array([r[0] for r in rows], dtype=np.int64)
-        entries = np.array([r[1] for r in rows], dtype=np.int64)
-        return columns, entries, np.array([r[2] for r in rows])
+        which, entries = self._entries["device"]
+        return INERTIAL + which, entries, self._scales[1][which]
 
     def elements(self, theta: Array) -> Array:
         """Mass, centre of mass, inertia about it."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.estimate.sampling import rate_noise
@@ -174,6 +173,11 @@ def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     return np.asarray(out + jumps @ jumps.transpose(0, 2, 1) / 12.0)
 
 
+def _in_use(in_raw: Array) -> NDArray[np.int64]:
+    """Raw outputs that a reading (N, w, 18 + n) depends on: a load cell's on one, a gyroscope's on three."""
+    return np.flatnonzero(np.any(in_raw, axis=(0, 1)))
+
+
 def _channel_rows(
     bench: Bench,
     run: Run,
@@ -182,48 +186,53 @@ def _channel_rows(
     reading: sensors.Reading,
     own: Array,
     node: NDArray[np.int64],
+    in_physics: Array,
     start_only: bool,
-) -> tuple[Array, Array, Array, Array]:
-    """(residual (g, w), derivative in [motion, own] columns (g, w, c), H (g, w, X), D (g, w, 6)).
+) -> tuple[Array, Array, Array]:
+    """(columns (g, w, 1 + p + b), H (g, w, X), D (g, w, 6)) of one channel.
 
-    index: of the channel. node (g,): where each sample was taken. The device's own columns, all of the
-    parameters' vector, are left out where ``start_only``.
+    columns: residual, derivatives in the p parameters, of which there are none where ``start_only``, and in
+    the b start coordinates. index: of the channel. node (g,): where each sample was taken. in_physics (d, p):
+    derivative of the motion's directions in the parameters.
     """
     parameters, channel = bench.parameters, run.channels[index]
     clock, lag = parameters.places.clock(channel.device), parameters.places.lag(channel.device)
     late, tau = own[clock], own[lag]
-    groups = channel.node.size
+    step, groups = run.grid.step, channel.node.size
     value, slope = run.samplers[index].at(late)
-    columns = channel.columns
-    values = lagged(run.grid.step, tau, reading.values[:, columns])
-    residual = channel.grouped - value @ values
+    reads = channel.columns
+    values = lagged(step, tau, reading.values[:, reads])
     _, _, motion_H, motion_D, motion_J = motion.derivatives
-    in_motion = motion_J.shape[2]
-    in_raw = reading.in_raw[:, columns]
+    in_raw = reading.in_raw[:, reads]
+    raw = _in_use(in_raw)
+    in_raw = in_raw[:, :, raw]
     nodes, width = in_raw.shape[:2]
-    total = lagged(run.grid.step, tau, (in_raw @ motion_J).reshape(nodes, width * in_motion))
-    jacobian = (value @ total).reshape(groups, width, in_motion)
-    H = in_raw[node] @ motion_H[node]
-    D = in_raw[node] @ motion_D[node]
+    known, starts = (0 if start_only else parameters.size), motion_J.shape[2] - in_physics.shape[0]
+    total = lagged(step, tau, (in_raw @ motion_J[:, raw]).reshape(nodes, -1))
+    in_motion = (value @ total).reshape(groups * width, -1)
+    H = in_raw[node] @ motion_H[node[:, None], raw]
+    D = in_raw[node] @ motion_D[node[:, None], raw]
+    out = np.empty((groups, width, 1 + known + starts))
+    flat = out.reshape(groups * width, -1)
+    out[:, :, 0] = channel.grouped - value @ values
+    flat[:, 1 + known :] = in_motion[:, :starts]
     if start_only:
-        return residual, jacobian, H, D
-    device_columns, entries, scale = parameters.device_columns()
+        return out, H, D
+    np.matmul(in_motion[:, starts:], in_physics, out=flat[:, 1 : 1 + known])
+    columns, entries, scale = parameters.device_columns()
     first = parameters.places.first(channel.device)
-    last = first + reading.in_device.shape[2]
     # Of a device's numbers most are certain
-    used = sorted({int(entry) for entry in entries if first <= entry < last})
-    own_columns = np.zeros((groups, width, parameters.size))
-    in_used = reading.in_device[:, columns][:, :, [entry - first for entry in used]]
-    in_used = lagged(run.grid.step, tau, in_used.reshape(nodes, width * len(used)))
-    own_map = (value @ in_used).reshape(groups, width, len(used))
-    for column, entry, s in zip(device_columns, entries, scale, strict=True):
-        if first <= entry < last:
-            own_columns[:, :, column] += s * own_map[:, :, used.index(int(entry))]
-        elif entry == clock:
-            own_columns[:, :, column] -= s * (slope @ values)
-        elif entry == lag:
-            own_columns[:, :, column] -= s * (slope @ lagged(run.grid.step, tau, values))
-    return residual, np.concatenate([jacobian, own_columns], axis=2), H, D
+    free = np.flatnonzero((entries >= first) & (entries < first + reading.in_device.shape[2]))
+    in_used = reading.in_device[:, reads][:, :, entries[free] - first]
+    own_map = value @ lagged(step, tau, in_used.reshape(nodes, -1))
+    own_map = own_map.reshape(groups, width, free.size)
+    for k, i in enumerate(free):
+        out[:, :, 1 + columns[i]] += scale[i] * own_map[:, :, k]
+    for entry, late_by in ((clock, values), (lag, None)):
+        for i in np.flatnonzero(entries == entry):
+            shown = lagged(step, tau, values) if late_by is None else late_by
+            out[:, :, 1 + columns[i]] -= scale[i] * (slope @ shown)
+    return out, H, D
 
 
 def longest_step(run: Run) -> float:
@@ -235,10 +244,10 @@ def longest_step(run: Run) -> float:
     return max(FIT_STEP, run.grid.step)
 
 
-def _no_rows(states: int, columns: int) -> tuple[NDArray[Any], ...]:
-    """What a run without a sample stacks."""
-    none = np.zeros(0, dtype=np.int64)
-    return none, none, none, np.zeros((0, states)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, columns))
+def _shown_at(run: Run, channel: Channel, own: Array, parameters: ParameterSet) -> NDArray[np.int64]:
+    """(g,) node of what each sample shows: a late device's was shaken by the force of earlier."""
+    late = own[parameters.places.clock(channel.device)] + max(own[parameters.places.lag(channel.device)], 0.0)
+    return np.asarray(np.clip(channel.node - round(late / run.grid.step), 0, run.grid.nodes - 1))
 
 
 def linearise_run(
@@ -280,50 +289,39 @@ def linearise_run(
     in_physics = parameters.physics_jacobian(theta)[: directions.size]
     starts = basis.shape[1]
     known = 0 if start_only else parameters.size
-    stacked: list[tuple[Array, ...]] = []
+    size = sum(c.node.size * c.width for c in run.channels)
+    which = np.repeat(np.arange(len(run.channels)), [c.node.size * c.width for c in run.channels])
+    shown = [_shown_at(run, c, own, parameters) for c in run.channels]
+    nodes = [
+        np.zeros(0, dtype=np.int64),
+        *(np.repeat(n, c.width) for n, c in zip(shown, run.channels, strict=True)),
+    ]
+    order = np.argsort(np.concatenate(nodes), kind="stable")
+    # Where each row goes
+    places = np.empty_like(order)
+    places[order] = np.arange(size)
+    at, which = np.concatenate(nodes)[order], which[order]
+    axis, variance = np.empty(size, dtype=np.int64), np.empty(size)
+    H, D = np.empty((size, motion.states.shape[1])), np.empty((size, 6))
+    columns = np.empty((size, 1 + known + starts))
     readings: dict[str, sensors.Reading] = {}
+    first = 0
     for index, channel in enumerate(run.channels):
         if channel.device not in readings:
             readings[channel.device] = read_device(
                 bench, channel.device, motion.outputs, motion.R_world_body, own, clock, run.R_tracker_mean
             )
+        rows, in_state, in_wrench = _channel_rows(
+            bench, run, index, motion, readings[channel.device], own, shown[index], in_physics, start_only
+        )
         tau = float(own[parameters.places.lag(channel.device)])
-        # What a late device shows was shaken by the force of earlier: to the nearest node
-        late = float(own[parameters.places.clock(channel.device)]) + max(tau, 0.0)
-        node = np.clip(channel.node - round(late / run.grid.step), 0, run.grid.nodes - 1)
-        residual, jacobian, H, D = _channel_rows(
-            bench, run, index, motion, readings[channel.device], own, node, start_only
-        )
-        in_motion = starts + directions.size
-        rows, axes = residual.size, channel.width
-        columns = np.empty((*residual.shape, 1 + known + starts))
-        columns[:, :, 0] = residual
-        columns[:, :, 1 + known :] = jacobian[:, :, :starts]
-        if not start_only:
-            columns[:, :, 1 : 1 + known] = (
-                jacobian[:, :, starts:in_motion] @ in_physics + jacobian[:, :, in_motion:]
-            )
-        stacked.append(
-            (
-                np.repeat(node, axes),
-                np.full(rows, index, dtype=np.int64),
-                np.tile(np.arange(axes), channel.node.size),
-                H.reshape(rows, -1),
-                D.reshape(rows, 6),
-                (
-                    channel.grouped_variance + unsettled(run.grid.step, tau, channel.node, channel.grouped)
-                ).ravel(),
-                columns.reshape(rows, -1),
-            )
-        )
-    if not stacked:
-        # A stretch in which nothing was measured moves as the model does
-        stacked.append(_no_rows(motion.states.shape[1], 1 + known + starts))
-    at, which, axis, H, D, variance, columns = (np.concatenate(part) for part in zip(*stacked, strict=True))
-    order = np.argsort(at, kind="stable")
-    at, which, axis, H, D, variance, columns = (
-        np.ascontiguousarray(part[order]) for part in (at, which, axis, H, D, variance, columns)
-    )
+        spread = channel.grouped_variance + unsettled(run.grid.step, tau, channel.node, channel.grouped)
+        here = places[first : first + spread.size]
+        first += spread.size
+        axis[here] = np.tile(np.arange(channel.width), channel.node.size)
+        variance[here] = spread.ravel()
+        H[here], D[here] = in_state.reshape(spread.size, -1), in_wrench.reshape(spread.size, 6)
+        columns[here] = rows.reshape(spread.size, -1)
     plain = columns[:, 0].copy()
     Q = force_noise(run, parameters, theta)
     felt = D

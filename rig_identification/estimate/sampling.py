@@ -49,6 +49,7 @@ class Sampler:
         """grid: the nodes. time (n,), group (n,): of each sample; groups: number of groups."""
         self._grid, self._time, self._group, self._groups = grid, time, group, groups
         self._found = self._weights(0)
+        self._last: tuple[float, csr_matrix, csr_matrix] | None = None
 
     def _weights(self, shift: int) -> tuple[int, Array, Any, Any]:
         """For a lateness of ``shift`` nodes: Taylor coefficients (4, w) of the weights, their nodes, rows."""
@@ -78,6 +79,9 @@ class Sampler:
 
         late: s by which the samples' stamps are late.
         """
+        last = self._last
+        if last is not None and last[0] == late:
+            return last[1], last[2]
         shift = round(late / self._grid.step)
         found = self._found
         if shift != found[0]:
@@ -88,7 +92,9 @@ class Sampler:
         value = powers[0] + d * (powers[1] + d * (powers[2] + d * powers[3]))
         slope = (powers[1] + d * (2.0 * powers[2] + d * 3.0 * powers[3])) / self._grid.step
         shape = (self._groups, self._grid.nodes)
-        return csr_matrix((value, nodes, rows), shape=shape), csr_matrix((slope, nodes, rows), shape=shape)
+        at, rate = (csr_matrix((w, nodes, rows), shape=shape) for w in (value, slope))
+        self._last = late, at, rate
+        return at, rate
 
 
 def interpolation(grid: Grid, time: Array, group: Index, groups: int) -> tuple[csr_matrix, csr_matrix]:

@@ -52,20 +52,48 @@ def elements_from_linear(linear: Array) -> Array:
 
 def linear_from_log_cholesky(theta: Array) -> Array:
     """(m, m c, I about the datum) from ten unconstrained numbers (class of the docstring above)."""
+    U = _triangle(theta)
+    return _linear_of(U @ U.T)
+
+
+def linear_in_log_cholesky(theta: Array) -> Array:
+    """(10, 10) derivative of :func:`linear_from_log_cholesky`: of U U^T it is dU U^T and its transpose."""
+    U = _triangle(theta)
+    change = np.zeros((10, 4, 4))
+    change[0] = U
+    scale = np.exp(theta[0])
+    for k in range(3):
+        change[1 + k, k, k] = U[k, k]
+        change[7 + k, k, 3] = scale
+    for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2))):
+        change[4 + k, i, j] = scale
+    half = change @ U.T
+    return np.stack([_linear_of(P) for P in half + half.transpose(0, 2, 1)], axis=1)
+
+
+def _triangle(theta: Array) -> Array:
+    """(4, 4) factor of the pseudo-inertia matrix U U^T."""
     a, d1, d2, d3, s12, s23, s13, t1, t2, t3 = theta
     zero = 0.0 * a
-    U = np.exp(a) * np.array(
-        [
-            [np.exp(d1), s12, s13, t1],
-            [zero, np.exp(d2), s23, t2],
-            [zero, zero, np.exp(d3), t3],
-            [zero, zero, zero, 1.0 + zero],
-        ]
+    return np.asarray(
+        np.exp(a)
+        * np.array(
+            [
+                [np.exp(d1), s12, s13, t1],
+                [zero, np.exp(d2), s23, t2],
+                [zero, zero, np.exp(d3), t3],
+                [zero, zero, zero, 1.0 + zero],
+            ]
+        )
     )
-    P = U @ U.T
-    S = P[:3, :3]
-    about_datum = np.trace(S) * np.eye(3) - S
-    return np.concatenate([[P[3, 3]], P[:3, 3], [about_datum[i, j] for i, j in _PAIRS]])
+
+
+def _linear_of(P: Array) -> Array:
+    """(m, m c, I about the datum) of a pseudo-inertia matrix (4, 4)."""
+    xx, yy, zz = P[0, 0], P[1, 1], P[2, 2]
+    return np.array(
+        [P[3, 3], P[0, 3], P[1, 3], P[2, 3], yy + zz, -P[0, 1], -P[0, 2], xx + zz, -P[1, 2], xx + yy]
+    )
 
 
 def log_cholesky_from_linear(linear: Array) -> Array:

@@ -1,12 +1,8 @@
-"""Motion and its exact derivatives: Runge-Kutta of fourth order on the rotation group.
+"""Motion: Runge-Kutta of fourth order on the rotation group; and how its accelerations change.
 
 Each step integrates the local state of dynamics.py from a fresh reference rotation
-(Munthe-Kaas, "High order Runge-Kutta methods on manifolds", 1999), goes back to the cable
-lengths, and carries sensitivity columns through the same four stages. Columns are kept
-per node interval as
-    x_{k+1} = A_k x_k + B_k w_k + C_k p        (first-order, about the motion)
-with w a wrench held over the interval and p the chosen entries of ``physics``, so that
-filters (noise that enters as force) and parameter derivatives share one pass.
+(Munthe-Kaas, "High order Runge-Kutta methods on manifolds", 1999) and goes back to the cable
+lengths. What a change of state, wrench or ``physics`` does to the motion: variation.py.
 """
 
 from __future__ import annotations
@@ -17,14 +13,11 @@ from numba import njit
 from rig_identification.model.arithmetic import STEP, eliminate, invert
 from rig_identification.model.constraints import (
     cable_length_and_rate,
-    project_columns,
     project_state,
     update_reference,
 )
 from rig_identification.model.dynamics import (
-    add_body,
     add_cable,
-    add_exciter,
     assemble,
     rotation,
     rotation_rate,
@@ -54,6 +47,11 @@ from rig_identification.model.layout import (
     SLACK,
     VELOCITY,
 )
+from rig_identification.model.number_columns import (
+    add_body_number,
+    add_exciter_number,
+    cable_number_columns,
+)
 from rig_identification.model.state_columns import body_and_cable_columns
 
 EXCITER_CLOCK = -1  # direction: the exciter's stamps are late by this (s)
@@ -79,63 +77,6 @@ def solve(physics, modes, mount, x, R, force, wrench, K, r, inverse, z):  # type
 
 
 @njit(cache=True, nogil=True)
-def _defect_in(physics, modes, mount, direction, reach, x, R, force, K, r, z, change):  # type: ignore[no-untyped-def]
-    """change (6 + n + s,): derivative of r - K z in physics[direction], z held.
-
-    The equations are a sum of parts, and only those that hold the number are written out.
-    """
-    air, gravity, rotor, hinged = reach
-    n, size = modes.shape[0], r.shape[0]
-    bodily = direction == EXCITER_CLOCK or direction < CABLES
-    effects = direction >= CABLES + CABLE_SIZE * n
-    for i in range(size):
-        r[i] = 0.0
-        change[i] = 0.0
-    if bodily:
-        for i in range(6):
-            for j in range(6):
-                K[i, j] = 0.0
-        if direction == EXCITER_CLOCK or direction >= EXCITER_POSITION:
-            add_exciter(physics, mount, force, r)
-            effects = rotor and direction != EXCITER_CLOCK
-        else:
-            add_body(physics, x, R, K, r)
-            effects = gravity if direction < INERTIAL else air
-        for i in range(6):
-            total = r[i].imag
-            for j in range(6):
-                total -= K[i, j].imag * z[j]
-            change[i] = total / STEP
-    elif not effects:
-        # A cable's numbers stand in its own row and column
-        cable = (direction - CABLES) // CABLE_SIZE
-        row = 6 + cable
-        for j in range(size):
-            K[row, j] = 0.0
-            K[j, row] = 0.0
-        add_cable(physics, cable, modes, x, R, K, r)
-        total = r[row].imag
-        for j in range(size):
-            total -= K[row, j].imag * z[j]
-            if j != row:
-                change[j] = -K[j, row].imag * z[row] / STEP
-        change[row] = total / STEP
-        effects = hinged
-    else:
-        # A ceiling's numbers and the softness of redundant cables stand in all cables' rows
-        K[:, :] = 0.0
-        for i in range(n):
-            add_cable(physics, i, modes, x, R, K, r)
-        _add_defect(K, r, z, change)
-        effects = effects or hinged
-    if effects:
-        K[:, :] = 0.0
-        r[:] = 0.0
-        add_effects(physics, modes, x, R, K, r)
-        _add_defect(K, r, z, change)
-
-
-@njit(cache=True, nogil=True)
 def _add_defect(K, r, z, change):  # type: ignore[no-untyped-def]
     """change += derivative of r - K z, carried by the imaginary parts of K and r."""
     for i in range(z.shape[0]):
@@ -147,151 +88,103 @@ def _add_defect(K, r, z, change):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse, directions, out):  # type: ignore[no-untyped-def]
-    """out (6 + n + s, 12 + 2 s + 6 + len(directions)) = dz in state, wrench and physics, by complex step."""
-    size, states = z.shape[0], x.shape[0]
+    """out (6 + n + s, 12 + 2 s + 6 + len(directions)) = dz in state, wrench and physics.
+
+    What every rig has is written out (state_columns.py, number_columns.py); effects carry their derivative in
+    the imaginary part.
+    """
+    size, states, n = z.shape[0], x.shape[0], modes.shape[0]
     xc = x.astype(np.complex128)
     pc = physics.astype(np.complex128)
-    fc = force.astype(np.complex128)
     R = np.empty((3, 3))
     Rc = np.empty((3, 3), dtype=np.complex128)
     Kc = np.empty((size, size), dtype=np.complex128)
     rc = np.empty(size, dtype=np.complex128)
-    change = np.empty(size)
-    first = states + WRENCH
-    block = CABLES + CABLE_SIZE * modes.shape[0]
+    own, change = np.empty((9, size)), np.empty(size)
+    block = CABLES + CABLE_SIZE * n
     weighty = physics.shape[0] > block and physics[block + LINEAR_DENSITY] != 0.0
     internal = (states - BODY_STATE) // 2
-    reach = effects_reach(physics, modes, internal)
+    air, heavy, rotor, hinged = effects_reach(physics, modes, internal)
     acting = internal > 0 or effects_act(physics, modes)
-    state_change = np.empty((size, states))
+    defect = np.zeros((size, states + directions.shape[0]))
     rotation(reference, x, R)
-    body_and_cable_columns(physics, modes, x, R, z, state_change)
-    for column in range(states + directions.shape[0]):
-        target = column if column < states else column + WRENCH
-        weighs = weighty
-        if column < states:
-            change[:] = 0.0
-            if acting:
-                xc[column] = complex(x[column], STEP)
-                rotation(reference, xc, Rc)
-                Kc[:, :] = 0.0
-                rc[:] = 0.0
-                add_effects(pc, modes, xc, Rc, Kc, rc)
-                _add_defect(Kc, rc, z, change)
-            for i in range(size):
-                change[i] += state_change[i, column]
+    body_and_cable_columns(physics, modes, x, R, z, defect[:, :states])
+    if acting:
+        for column in range(states):
+            xc[column] = complex(x[column], STEP)
+            rotation(reference, xc, Rc)
+            Kc[:, :] = 0.0
+            rc[:] = 0.0
+            add_effects(pc, modes, xc, Rc, Kc, rc)
+            _add_defect(Kc, rc, z, defect[:, column])
+            xc[column] = x[column]
+    rotation(reference, xc, Rc)
+    known = -1
+    for column in range(directions.shape[0]):
+        d = directions[column]
+        change[:] = 0.0
+        if d == EXCITER_CLOCK or EXCITER_POSITION <= d < CABLES:
+            add_exciter_number(physics, mount, d, force, force_rate, change)
+            reached = rotor and d != EXCITER_CLOCK
+        elif d < CABLES:
+            add_body_number(physics, d, x, R, z, change)
+            reached = heavy if d < INERTIAL else air
+        elif d < block:
+            cable = (d - CABLES) // CABLE_SIZE
+            if cable != known:
+                cable_number_columns(physics, modes, cable, x, R, z, own)
+                known = cable
+            number = (d - CABLES) % CABLE_SIZE
+            if number < own.shape[0]:
+                change[:] = own[number]
+            reached = hinged
         else:
-            if column == states:
-                rotation(reference, xc, Rc)
-            d = directions[column - states]
-            if d == EXCITER_CLOCK:
-                for i in range(3):
-                    fc[i] = complex(force[i], STEP * force_rate[i])
-            else:
-                pc[d] = complex(physics[d], STEP)
-                weighs = weighty or d == block + LINEAR_DENSITY
-            _defect_in(pc, modes, mount, d, reach, xc, Rc, fc, Kc, rc, z, change)
+            # A ceiling's numbers and the softness of redundant cables stand in all cables' rows
+            pc[d] = complex(physics[d], STEP)
+            Kc[:, :] = 0.0
+            rc[:] = 0.0
+            for i in range(n):
+                add_cable(pc, i, modes, xc, Rc, Kc, rc)
+            _add_defect(Kc, rc, z, change)
+            reached = True
+        if reached:
+            pc[d] = complex(physics[d], STEP)
+            Kc[:, :] = 0.0
+            rc[:] = 0.0
+            add_effects(pc, modes, xc, Rc, Kc, rc)
+            _add_defect(Kc, rc, z, change)
+        if d >= 0:
+            pc[d] = physics[d]
         for i in range(size):
-            total = 0.0
-            for j in range(size):
-                total += inverse[i, j] * change[j]
-            out[i, target] = total
-        if weighs:
-            for i in range(modes.shape[0]):
-                out[6 + i, target] += weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
+            defect[i, states + column] = change[i]
+    out[:, :] = 0.0
+    for i in range(size):
+        for j in range(size):
+            g = inverse[i, j]
+            if g != 0.0:
+                for c in range(states):
+                    out[i, c] += g * defect[j, c]
+                for c in range(states, defect.shape[1]):
+                    out[i, c + WRENCH] += g * defect[j, c]
+        for j in range(WRENCH):
+            out[i, states + j] = inverse[i, j]
+    for column in range(states + directions.shape[0]):
+        heavier = column >= states and directions[column - states] == block + LINEAR_DENSITY
+        if not weighty and not heavier:
+            continue
+        target = column if column < states else column + WRENCH
+        if column < states:
+            xc[column] = complex(x[column], STEP)
+            rotation(reference, xc, Rc)
+        elif directions[column - states] >= 0:
+            rotation(reference, xc, Rc)
+            pc[directions[column - states]] = complex(physics[directions[column - states]], STEP)
+        for i in range(n):
+            out[6 + i, target] += weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
         if column < states:
             xc[column] = x[column]
-        elif directions[column - states] == EXCITER_CLOCK:
-            for i in range(3):
-                fc[i] = force[i]
-        else:
+        elif directions[column - states] >= 0:
             pc[directions[column - states]] = physics[directions[column - states]]
-    for i in range(size):
-        for j in range(WRENCH):
-            out[i, first - WRENCH + j] = inverse[i, j]
-
-
-@njit(cache=True, nogil=True)
-def _stage_columns(x, R, z, dz, columns, slopes):  # type: ignore[no-untyped-def]
-    """slopes (12 + 2 s, m) = d(dx/dt) for stage columns (12 + 2 s, m): state, wrench, physics blocks."""
-    m = columns.shape[1]
-    states = x.shape[0]
-    internal = (states - BODY_STATE) // 2
-    behind = z.shape[0] - internal - 6
-    # z responds to the state through dz's first columns, and directly to wrench and physics
-    for c in range(m):
-        for i in range(3):
-            slopes[i, c] = columns[VELOCITY + i, c]
-    response = np.zeros((6 + internal, m))
-    for i in range(6 + internal):
-        row = i if i < 6 else i + behind
-        for d in range(states):
-            g = dz[row, d]
-            if g != 0.0:
-                for c in range(m):
-                    response[i, c] += g * columns[d, c]
-        for c in range(states, m):
-            response[i, c] += dz[row, c]
-    for j in range(internal):
-        for c in range(m):
-            slopes[BODY_STATE + j, c] = columns[BODY_STATE + internal + j, c]
-            slopes[BODY_STATE + internal + j, c] = response[6 + j, c]
-    # dv/dt = R A: change of A, and of R: R (dtheta x A), dtheta = J_r(phi) dphi ~ dphi - phi x dphi / 2
-    p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
-    w0, w1, w2 = x[RATE], x[RATE + 1], x[RATE + 2]
-    t = p0 * p0 + p1 * p1 + p2 * p2
-    c2 = 0.5 - t / 24.0
-    c3 = 1.0 / 6.0 - t / 120.0
-    k = 1.0 / 12.0 + t / 720.0
-    for c in range(m):
-        f0, f1, f2 = columns[ROTATION, c], columns[ROTATION + 1, c], columns[ROTATION + 2, c]
-        q0 = p1 * f2 - p2 * f1
-        q1 = p2 * f0 - p0 * f2
-        q2 = p0 * f1 - p1 * f0
-        t0 = f0 - c2 * q0 + c3 * (p1 * q2 - p2 * q1)
-        t1 = f1 - c2 * q1 + c3 * (p2 * q0 - p0 * q2)
-        t2 = f2 - c2 * q2 + c3 * (p0 * q1 - p1 * q0)
-        r0 = response[0, c] + t1 * z[2] - t2 * z[1]
-        r1 = response[1, c] + t2 * z[0] - t0 * z[2]
-        r2 = response[2, c] + t0 * z[1] - t1 * z[0]
-        for i in range(3):
-            slopes[VELOCITY + i, c] = R[i, 0] * r0 + R[i, 1] * r1 + R[i, 2] * r2
-            slopes[RATE + i, c] = response[3 + i, c]
-        # dphi/dt = w + phi x w / 2 + k phi x (phi x w)
-        g0, g1, g2 = columns[RATE, c], columns[RATE + 1, c], columns[RATE + 2, c]
-        s0 = p1 * w2 - p2 * w1
-        s1 = p2 * w0 - p0 * w2
-        s2 = p0 * w1 - p1 * w0
-        d0 = f1 * w2 - f2 * w1 + p1 * g2 - p2 * g1
-        d1 = f2 * w0 - f0 * w2 + p2 * g0 - p0 * g2
-        d2 = f0 * w1 - f1 * w0 + p0 * g1 - p1 * g0
-        dk = (p0 * f0 + p1 * f1 + p2 * f2) / 360.0
-        slopes[ROTATION, c] = (
-            g0 + 0.5 * d0 + k * (f1 * s2 - f2 * s1 + p1 * d2 - p2 * d1) + dk * (p1 * s2 - p2 * s1)
-        )
-        slopes[ROTATION + 1, c] = (
-            g1 + 0.5 * d1 + k * (f2 * s0 - f0 * s2 + p2 * d0 - p0 * d2) + dk * (p2 * s0 - p0 * s2)
-        )
-        slopes[ROTATION + 2, c] = (
-            g2 + 0.5 * d2 + k * (f0 * s1 - f1 * s0 + p0 * d1 - p1 * d0) + dk * (p0 * s1 - p1 * s0)
-        )
-
-
-@njit(cache=True, nogil=True)
-def _absorb_rotation_columns(x, columns):  # type: ignore[no-untyped-def]
-    """Turn columns of phi into columns of the right rotation increment of R_ref Exp(phi)."""
-    p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
-    t = p0 * p0 + p1 * p1 + p2 * p2
-    c2 = 0.5 - t / 24.0
-    c3 = 1.0 / 6.0 - t / 120.0
-    for c in range(columns.shape[1]):
-        f0, f1, f2 = columns[ROTATION, c], columns[ROTATION + 1, c], columns[ROTATION + 2, c]
-        q0 = p1 * f2 - p2 * f1
-        q1 = p2 * f0 - p0 * f2
-        q2 = p0 * f1 - p1 * f0
-        columns[ROTATION, c] = f0 - c2 * q0 + c3 * (p1 * q2 - p2 * q1)
-        columns[ROTATION + 1, c] = f1 - c2 * q1 + c3 * (p2 * q0 - p0 * q2)
-        columns[ROTATION + 2, c] = f2 - c2 * q2 + c3 * (p0 * q1 - p1 * q0)
 
 
 @njit(cache=True, nogil=True)
@@ -312,45 +205,6 @@ def _write_outputs(physics, modes, R, x, z, out):  # type: ignore[no-untyped-def
         out[OUT_TENSION + i] = z[6 + i]
         if physics.shape[0] > block:
             out[OUT_TENSION + i] += weight_below_cell(physics, block, modes, i, x, R)
-
-
-@njit(cache=True, nogil=True)
-def _write_output_columns(physics, states, R, dz, directions, out):  # type: ignore[no-untyped-def]
-    """out (OUT_TENSION + n, states + 6 + d): derivative of raw outputs in state, wrench, physics."""
-    n = out.shape[0] - OUT_TENSION
-    m = dz.shape[1]
-    for i in range(OUT_TENSION):
-        for c in range(m):
-            out[i, c] = 0.0
-    g = np.zeros(3)
-    for i in range(3):
-        for j in range(3):
-            g[i] += R[j, i] * physics[GRAVITY + j]
-    for i in range(3):
-        out[OUT_POSITION + i, i] = 1.0
-        out[OUT_ROTATION + i, ROTATION + i] = 1.0
-        out[OUT_RATE + i, RATE + i] = 1.0
-        for c in range(m):
-            out[OUT_SPECIFIC_FORCE + i, c] = dz[i, c]
-            out[OUT_ANGULAR_ACCELERATION + i, c] = dz[3 + i, c]
-    # d(R^T g) = (R^T g) x dtheta + R^T dg
-    out[OUT_GRAVITY, ROTATION + 1] = -g[2]
-    out[OUT_GRAVITY, ROTATION + 2] = g[1]
-    out[OUT_GRAVITY + 1, ROTATION] = g[2]
-    out[OUT_GRAVITY + 1, ROTATION + 2] = -g[0]
-    out[OUT_GRAVITY + 2, ROTATION] = -g[1]
-    out[OUT_GRAVITY + 2, ROTATION + 1] = g[0]
-    for k in range(directions.shape[0]):
-        d = directions[k]
-        if GRAVITY <= d < GRAVITY + 3:
-            for i in range(3):
-                out[OUT_GRAVITY + i, states + WRENCH + k] = R[d - GRAVITY, i]
-    for i in range(3):
-        for c in range(m):
-            out[OUT_SPECIFIC_FORCE + i, c] -= out[OUT_GRAVITY + i, c]
-    for i in range(n):
-        for c in range(m):
-            out[OUT_TENSION + i, c] = dz[6 + i, c]
 
 
 @njit(cache=True, nogil=True)
@@ -375,6 +229,16 @@ def _switch_cables(physics, modes, x, reference, z, can_slacken):  # type: ignor
 
 
 @njit(cache=True, nogil=True)
+def exciter_at(forces, force_rates, force_middles, node, at, force, rate):  # type: ignore[no-untyped-def]
+    """force, rate (3,): of the exciter at a share ``at`` of the interval that begins at ``node``."""
+    following = min(node + 1, forces.shape[0] - 1)
+    for i in range(3):
+        force[i] = forces[node, i] + at * (forces[following, i] - forces[node, i])
+        force[i] += 4.0 * at * (1.0 - at) * force_middles[node, i]
+        rate[i] = force_rates[node, i] + at * (force_rates[following, i] - force_rates[node, i])
+
+
+@njit(cache=True, nogil=True)
 def propagate(  # type: ignore[no-untyped-def]
     physics,
     modes,
@@ -388,17 +252,12 @@ def propagate(  # type: ignore[no-untyped-def]
     wrenches,
     step,
     substeps,
-    directions,
-    start_columns,
-    sensitivity,
     nodes_x,
     nodes_R,
     nodes_out,
-    A,
-    B,
-    H,
-    D,
-    J,
+    line_x,
+    line_R,
+    line_modes,
 ):
     """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
 
@@ -406,24 +265,20 @@ def propagate(  # type: ignore[no-untyped-def]
     forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between;
     force_middles (N, 3): what the force has midway to the next node beyond that line (a parabola).
     wrenches (N, 6): further wrench,
-    body axes, held over the interval. directions (d,): entries of ``physics`` to
-    differentiate in (EXCITER_CLOCK: clock). start_columns (X, b + d): derivative of the
-    start state, X = 12 + 2 s, in b start coordinates and the d directions.
-    Filled: nodes_x (N, X), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and where
-    ``sensitivity``: A (N, X, X), B (N, X, 6), H (N, OUT_TENSION + n, X), D (N, OUT_TENSION + n, 6), and
-    J (N, OUT_TENSION + n, b + d), total derivatives of the raw outputs.
+    body axes, held over the interval.
+    Filled: nodes_x (N, X), X = 12 + 2 s, nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and for
+    variation.py the motion at the 2 L points that begin and halve L equal parts of each interval, none
+    where L is zero, which ``substeps`` is a multiple of: line_x (N, 2 L, X) with phi = 0, line_R
+    (N, 2 L, 3, 3) and line_modes (N, 2 L, n).
     """
     nodes = forces.shape[0]
     n = modes.shape[0]
     states = x.shape[0]
     internal = (states - BODY_STATE) // 2
     size = 6 + n + internal
-    d = directions.shape[0]
-    local = states + WRENCH + d
-    starts = start_columns.shape[1] - d
     K = np.empty((size, size))
     r = np.empty(size)
-    inverse = np.empty((size if sensitivity else 0, size))
+    inverse = np.empty((0, size))
     z = np.empty(size)
     R = np.empty((3, 3))
     k = np.empty((4, states))
@@ -434,30 +289,16 @@ def propagate(  # type: ignore[no-untyped-def]
     h = step / substeps
     weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
     ahead = np.array([0.0, 0.5, 0.5, 1.0])
-    dz = np.empty((size, local if sensitivity else 0))
-    columns = np.zeros((states, local if sensitivity else 0))
-    stage = np.zeros((states, local if sensitivity else 0))
-    slopes = np.empty((4, states, local if sensitivity else 0))
-    out_columns = np.empty((OUT_TENSION + n, local if sensitivity else 0))
-    S = start_columns.copy()
+    # Points in halves of a substep: in the middle of an odd number of substeps there is none
+    apart = 0 if line_x.shape[1] == 0 else 2 * substeps // line_x.shape[1]
     for node in range(nodes):
         last = node == nodes - 1
         wrench = wrenches[node]
-        if sensitivity:
-            columns[:, :] = 0.0
-            for i in range(states):
-                columns[i, i] = 1.0
         for sub in range(1 if last else substeps):
             for s in range(4):
                 for i in range(states):
                     y[i] = x[i] + (h * ahead[s] * k[s - 1, i] if s > 0 else 0.0)
-                at = (sub + ahead[s]) / substeps
-                for i in range(3):
-                    after = forces[node, i] if last else forces[node + 1, i]
-                    force[i] = forces[node, i] + at * (after - forces[node, i])
-                    force[i] += 4.0 * at * (1.0 - at) * force_middles[node, i]
-                    rate_after = force_rates[node, i] if last else force_rates[node + 1, i]
-                    rate[i] = force_rates[node, i] + at * (rate_after - force_rates[node, i])
+                exciter_at(forces, force_rates, force_middles, node, (sub + ahead[s]) / substeps, force, rate)
                 rotation(reference, y, R)
                 if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
                     return node
@@ -467,21 +308,19 @@ def propagate(  # type: ignore[no-untyped-def]
                     rotation(reference, y, R)
                     if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
                         return node
-                if sensitivity:
-                    linearise(physics, modes, mount, reference, y, force, rate, z, inverse, directions, dz)
                 if s == 0 and sub == 0:
                     nodes_x[node] = y
                     nodes_R[node] = R
                     _write_outputs(physics, modes, R, y, z, nodes_out[node])
-                    if sensitivity:
-                        _write_output_columns(physics, states, R, dz, directions, out_columns)
-                        H[node] = out_columns[:, :states]
-                        D[node] = out_columns[:, states : states + WRENCH]
-                        total = np.dot(np.ascontiguousarray(out_columns[:, :states]), S)
-                        total[:, starts:] += out_columns[:, states + WRENCH :]
-                        J[node] = total
-                    if last:
-                        return nodes
+                halves = 2 * sub + (0 if s == 0 else 1)
+                if apart > 0 and (s == 0 or s == 2) and halves % apart == 0:
+                    point = halves // apart
+                    line_x[node, point] = y
+                    line_x[node, point, ROTATION : ROTATION + 3] = 0.0
+                    line_R[node, point] = R
+                    line_modes[node, point] = modes
+                if s == 0 and last:
+                    return nodes
                 rotation_rate(y, phi_rate)
                 for i in range(3):
                     k[s, i] = y[VELOCITY + i]
@@ -491,14 +330,6 @@ def propagate(  # type: ignore[no-untyped-def]
                 for i in range(internal):
                     k[s, BODY_STATE + i] = y[BODY_STATE + internal + i]
                     k[s, BODY_STATE + internal + i] = z[6 + n + i]
-                if sensitivity:
-                    if s == 0:
-                        stage[:, :] = columns
-                    else:
-                        for i in range(states):
-                            for c in range(local):
-                                stage[i, c] = columns[i, c] + h * ahead[s] * slopes[s - 1, i, c]
-                    _stage_columns(y, R, z, dz, stage, slopes[s])
             for i in range(states):
                 total_rate = 0.0
                 for s in range(4):
@@ -506,19 +337,6 @@ def propagate(  # type: ignore[no-untyped-def]
                 x[i] += h * total_rate
                 if not abs(x[i]) < 1e6:
                     return node
-            if sensitivity:
-                for s in range(4):
-                    for i in range(states):
-                        for c in range(local):
-                            columns[i, c] += h * weights[s] * slopes[s, i, c]
-                _absorb_rotation_columns(x, columns)
             update_reference(reference, x)
             project_state(physics, modes, x, reference)
-            if sensitivity:
-                project_columns(physics, modes, x, reference, directions, states + WRENCH, columns)
-        if sensitivity:
-            A[node] = columns[:, :states]
-            B[node] = columns[:, states : states + WRENCH]
-            S = np.dot(np.ascontiguousarray(columns[:, :states]), S)
-            S[:, starts:] += columns[:, states + WRENCH :]
     return nodes

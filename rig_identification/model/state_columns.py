@@ -49,12 +49,13 @@ from rig_identification.model.layout import (
 
 
 @njit(cache=True, inline="always")
-def _cross(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+def cross(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+    """a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @njit(cache=True, inline="always")
-def _in_body(R, a, b, c):  # type: ignore[no-untyped-def]
+def in_body(R, a, b, c):  # type: ignore[no-untyped-def]
     """R^T (a, b, c): a world vector in body axes."""
     return (
         R[0, 0] * a + R[1, 0] * b + R[2, 0] * c,
@@ -72,8 +73,8 @@ def rotation_increments(x, tau):  # type: ignore[no-untyped-def]
     c3 = 1.0 / 6.0 - t / 120.0 + t * t / 5040.0
     for k in range(3):
         ex, ey, ez = 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)
-        px, py, pz = _cross(a, b, c, ex, ey, ez)
-        qx, qy, qz = _cross(a, b, c, px, py, pz)
+        px, py, pz = cross(a, b, c, ex, ey, ez)
+        qx, qy, qz = cross(a, b, c, px, py, pz)
         tau[k, 0] = ex - c2 * px + c3 * qx
         tau[k, 1] = ey - c2 * py + c3 * qy
         tau[k, 2] = ez - c2 * pz + c3 * qz
@@ -87,32 +88,32 @@ def _add_body_columns(physics, x, R, tau, change):  # type: ignore[no-untyped-de
     iyy, iyz, izz = physics[INERTIAL + 7], physics[INERTIAL + 8], physics[INERTIAL + 9]
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
     g0, g1, g2 = physics[GRAVITY], physics[GRAVITY + 1], physics[GRAVITY + 2]
-    gx, gy, gz = _in_body(R, g0, g1, g2)
-    ax, ay, az = _cross(wx, wy, wz, hx, hy, hz)
+    gx, gy, gz = in_body(R, g0, g1, g2)
+    ax, ay, az = cross(wx, wy, wz, hx, hy, hz)
     lx = ixx * wx + ixy * wy + ixz * wz
     ly = ixy * wx + iyy * wy + iyz * wz
     lz = ixz * wx + iyz * wy + izz * wz
     for k in range(3):
-        dx, dy, dz = _cross(gx, gy, gz, tau[k, 0], tau[k, 1], tau[k, 2])
+        dx, dy, dz = cross(gx, gy, gz, tau[k, 0], tau[k, 1], tau[k, 2])
         change[0, ROTATION + k] += m * dx
         change[1, ROTATION + k] += m * dy
         change[2, ROTATION + k] += m * dz
-        nx, ny, nz = _cross(hx, hy, hz, dx, dy, dz)
+        nx, ny, nz = cross(hx, hy, hz, dx, dy, dz)
         change[3, ROTATION + k] += nx
         change[4, ROTATION + k] += ny
         change[5, ROTATION + k] += nz
         ex, ey, ez = 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)
-        px, py, pz = _cross(ex, ey, ez, ax, ay, az)
-        qx, qy, qz = _cross(ex, ey, ez, hx, hy, hz)
-        sx, sy, sz = _cross(wx, wy, wz, qx, qy, qz)
+        px, py, pz = cross(ex, ey, ez, ax, ay, az)
+        qx, qy, qz = cross(ex, ey, ez, hx, hy, hz)
+        sx, sy, sz = cross(wx, wy, wz, qx, qy, qz)
         change[0, RATE + k] -= px + sx
         change[1, RATE + k] -= py + sy
         change[2, RATE + k] -= pz + sz
-        px, py, pz = _cross(ex, ey, ez, lx, ly, lz)
+        px, py, pz = cross(ex, ey, ez, lx, ly, lz)
         ix = ixx * ex + ixy * ey + ixz * ez
         iy = ixy * ex + iyy * ey + iyz * ez
         iz = ixz * ex + iyz * ey + izz * ez
-        sx, sy, sz = _cross(wx, wy, wz, ix, iy, iz)
+        sx, sy, sz = cross(wx, wy, wz, ix, iy, iz)
         change[3, RATE + k] -= px + sx
         change[4, RATE + k] -= py + sy
         change[5, RATE + k] -= pz + sz
@@ -129,22 +130,22 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
     # A yielding ceiling moves the upper hinges
     s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
     v0, v1, v2 = x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2
-    vx, vy, vz = _in_body(R, v0, v1, v2)
+    vx, vy, vz = in_body(R, v0, v1, v2)
     bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
     d0 = physics[o + CEILING_POINT] + s0 - x[0]
     d1 = physics[o + CEILING_POINT + 1] + s1 - x[1]
     d2 = physics[o + CEILING_POINT + 2] + s2 - x[2]
     # From the datum to the ceiling's hinge, and from the body's
-    fx, fy, fz = _in_body(R, d0, d1, d2)
+    fx, fy, fz = in_body(R, d0, d1, d2)
     ux, uy, uz = fx - bx, fy - by, fz - bz
     length = math.sqrt(ux * ux + uy * uy + uz * uz)
     per_length = 1.0 / length
     ux, uy, uz = ux * per_length, uy * per_length, uz * per_length
-    ex, ey, ez = _cross(wx, wy, wz, bx, by, bz)
+    ex, ey, ez = cross(wx, wy, wz, bx, by, bz)
     sx, sy, sz = vx + ex, vy + ey, vz + ez
     along = ux * sx + uy * sy + uz * sz
     across = (sx * sx + sy * sy + sz * sz - along * along) * per_length
-    cx, cy, cz = _cross(wx, wy, wz, ex, ey, ez)
+    cx, cy, cz = cross(wx, wy, wz, ex, ey, ez)
     tension = z[row]
     rigid = mode == RIGID
     unloaded = physics[o + LENGTH]
@@ -161,22 +162,22 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
         if column < ROTATION:
             dx, dy, dz = -R[k, 0], -R[k, 1], -R[k, 2]
         elif column < VELOCITY:
-            dx, dy, dz = _cross(fx, fy, fz, tau[k, 0], tau[k, 1], tau[k, 2])
-            px, py, pz = _cross(vx, vy, vz, tau[k, 0], tau[k, 1], tau[k, 2])
+            dx, dy, dz = cross(fx, fy, fz, tau[k, 0], tau[k, 1], tau[k, 2])
+            px, py, pz = cross(vx, vy, vz, tau[k, 0], tau[k, 1], tau[k, 2])
         elif column < RATE:
             px, py, pz = R[k, 0], R[k, 1], R[k, 2]
         elif column >= BODY_STATE:
             own = block + INTERNAL_SIZE * ((column - BODY_STATE) % internal)
             if physics[own + KIND] != CEILING:
                 continue
-            rx, ry, rz = _in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
+            rx, ry, rz = in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
             if column < BODY_STATE + internal:
                 dx, dy, dz = rx, ry, rz
             else:
                 px, py, pz = -rx, -ry, -rz
         else:
             qx, qy, qz = 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)
-            px, py, pz = _cross(qx, qy, qz, bx, by, bz)
+            px, py, pz = cross(qx, qy, qz, bx, by, bz)
         longer = ux * dx + uy * dy + uz * dz
         tx, ty, tz = (
             (dx - ux * longer) * per_length,
@@ -186,7 +187,7 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
         faster = tx * sx + ty * sy + tz * sz + ux * px + uy * py + uz * pz
         placed = column < VELOCITY or BODY_STATE <= column < BODY_STATE + internal
         if placed:
-            mx, my, mz = _cross(bx, by, bz, tx, ty, tz)
+            mx, my, mz = cross(bx, by, bz, tx, ty, tz)
             change[0, column] += tension * tx
             change[1, column] += tension * ty
             change[2, column] += tension * tz
@@ -201,10 +202,10 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
             total -= 2.0 * (sx * px + sy * py + sz * pz - along * faster) * per_length
             total += across * longer * per_length
             if RATE <= column < BODY_STATE:
-                ax, ay, az = _cross(qx, qy, qz, ex, ey, ez)
+                ax, ay, az = cross(qx, qy, qz, ex, ey, ez)
                 total += ux * ax + uy * ay + uz * az
                 # d(w x b) is all that the rate does to the hinge's velocity
-                ax, ay, az = _cross(wx, wy, wz, px, py, pz)
+                ax, ay, az = cross(wx, wy, wz, px, py, pz)
                 total += ux * ax + uy * ay + uz * az
             change[row, column] += total
         else:
@@ -216,10 +217,10 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
             own = block + INTERNAL_SIZE * j
             if physics[own + KIND] != CEILING:
                 continue
-            rx, ry, rz = _in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
+            rx, ry, rz = in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
             turned = rx * tx + ry * ty + rz * tz
             if ROTATION <= column < VELOCITY:
-                ax, ay, az = _cross(rx, ry, rz, tau[k, 0], tau[k, 1], tau[k, 2])
+                ax, ay, az = cross(rx, ry, rz, tau[k, 0], tau[k, 1], tau[k, 2])
                 turned += ux * ax + uy * ay + uz * az
             change[6 + n + j, column] -= physics[own + COMPLIANCE] * turned * tension
             if rigid:
