@@ -252,7 +252,7 @@ def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> in
 
 #: Parts of a node interval, at most, over each of which the linearised equations are a parabola: they change
 #: with the swing, not with a stiff cable's own ringing.
-LINES = 4
+LINES = 2
 
 
 def lines_for(model: RigModel, substeps: int) -> int:
