@@ -147,7 +147,7 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
         layout.cable_offset(1),
         layout.cable_offset(0) + layout.LENGTH,
     ]
-    check_physics(model, start, drive, body, 5e-5)
+    check_physics(model, start, drive, body, 1e-5)
     steps = {layout.MASS: 0.1, layout.POINT: 1e-3, layout.POINT + 2: 1e-3}
     steps |= {layout.FREQUENCY: 1e-4, layout.DAMPING_RATIO: 1e-3}
     entries = {place.internal_block(3, k) + e: h for k in (0, 2, 4) for e, h in steps.items()}
@@ -164,7 +164,7 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
             ends.append(simulate(model.with_physics(physics), start, drive, substeps=20).outputs)
         numeric = (ends[0] - ends[1])[:, where] / (2.0 * h)
         size = np.maximum(np.max(np.abs(numeric)), 1e-9)
-        assert np.max(np.abs(exact.J[:, where, k] - numeric)) < 5e-5 * size, entry
+        assert np.max(np.abs(exact.J[:, where, k] - numeric)) < 1e-5 * size, entry
 
 
 def test_start_coordinates_of_internal_motion() -> None:

@@ -52,7 +52,7 @@ FITTED = 2
 #: Std by which the strongest part of a law has to be seen: twice what one needs to stay.
 CERTAIN = 2.0 * SEEN
 #: s, to which the runs of a law's fit grow after the first horizons: straight to all its steps are lost.
-LONGER = (2.5, 4.0, 8.0)
+LONGER = (4.0, 8.0)
 
 
 def lawful(

@@ -89,6 +89,7 @@ class Look:
     moving: bool = False  # whether rest asks for next to nothing, and no change of numbers promises much
     rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
+    slowly: list[Promise] = field(default_factory=list)  # along the measured motion, what is fitted slowly
 
     @property
     def count(self) -> int:
@@ -124,6 +125,13 @@ class Look:
     def almost(self) -> bool:
         """Whether anything that was tried leaves little of what was left, and yet more than noise."""
         return any(almost(t, self.seen) for t in self.tried)
+
+    @property
+    def leads_on(self) -> bool:
+        """Whether what was tried may leave nothing with one more, before what is fitted slowly is."""
+        if self.almost:
+            return True
+        return bool(self.slowly) and any(excess(t.evaluation) < CHIEF * self.left for t in self.tried)
 
     @cached_property
     def left(self) -> float:
@@ -174,12 +182,29 @@ class Look:
         self.begin(worthy)
 
     def as_measured(self) -> None:
-        """What the motion that was measured promises most of, in a rig as it is described."""
+        """What the motion that was measured promises most of, in a rig as it is described.
+
+        First what is fitted soon, a number of a device or the rig; with it and one more all may be explained.
+        """
         if self.alone.measured is None:
             return
         self.notify("along the motion that was measured")
         along = self.alone.measured(self.candidates)
-        for promise in along.worthy:
+        soon = [p for p in along.worthy if along.beyond or not p.candidate.slow]
+        self.slowly = [p for p in along.worthy if p not in soon]
+        self._fit_as_described(soon)
+        if along.beyond and not self.enough and not self.almost:
+            sure = {p.candidate.label for p in along.sure}
+            self.certain = self._contradicting([t for t in self.tried if t.candidate.label in sure])
+
+    def slowly_as_measured(self) -> None:
+        """What the motion that was measured promises most of, and is fitted in ten times the time."""
+        promises, self.slowly = self.slowly, []
+        if not self.enough:
+            self._fit_as_described(promises)
+
+    def _fit_as_described(self, promises: list[Promise]) -> None:
+        for promise in promises:
             if self.budget.spent() or (promise.candidate.slow and self.enough):
                 continue
             self.notify(promise.candidate.label)
@@ -189,9 +214,6 @@ class Look:
                     self.tried.append(trial)
                     if at_noise(trial) or almost(trial, self.seen):
                         break
-        if along.beyond and not self.enough and not self.almost:
-            sure = {p.candidate.label for p in along.sure}
-            self.certain = self._contradicting([t for t in self.tried if t.candidate.label in sure])
 
     def _contradicting(self, told: list[Trial]) -> list[Trial]:
         """What other devices contradict whatever acts on the body, beside another effect of the motion.

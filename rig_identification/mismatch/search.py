@@ -125,11 +125,11 @@ def _from_afar(look: Look, more: bool) -> tuple[Trial | None, list[Trial]]:
     Each witness is asked only where those before it leave something. What takes nearly all away is asked at
     once whether with one more it leaves nothing.
     """
-    for witness in (look.as_measured, look.outright):
+    for witness in (look.as_measured, look.slowly_as_measured, look.outright):
         witness()
         if more and look.certain:
             return None, look.certain
-        lead = look.leading() if more and look.almost else None
+        lead = look.leading() if more and look.leads_on else None
         if lead is not None or look.enough:
             return lead, []
     look.at_rest()

@@ -10,6 +10,8 @@ parameter p as well.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -28,6 +30,7 @@ from rig_identification.model.layout import (
     ROTATION,
     VELOCITY,
 )
+from rig_identification.model.state_columns import cross, in_body
 
 
 @njit(cache=True)
@@ -155,8 +158,69 @@ def project_state(physics, modes, x, reference):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _length_changes(physics, n, i, x, R, longer, faster):  # type: ignore[no-untyped-def]
+    """longer, faster (12,): derivatives of cable i's l and dl/dt where the local state has no rotation.
+
+    In the pose (position, right-hand rotation increment), the ceiling's point and the body's. With u along
+    the cable, D its line to the ceiling and s the body hinge's velocity, dl = u . dD and
+    d(dl/dt) = -(du . s + u . ds), du = (dD - u (u . dD))/l.
+    """
+    o = CABLES + CABLE_SIZE * i
+    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
+    wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
+    vx, vy, vz = in_body(R, x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2)
+    bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
+    fx, fy, fz = in_body(
+        R,
+        physics[o + CEILING_POINT] + s0 - x[0],
+        physics[o + CEILING_POINT + 1] + s1 - x[1],
+        physics[o + CEILING_POINT + 2] + s2 - x[2],
+    )
+    ux, uy, uz = fx - bx, fy - by, fz - bz
+    k = 1.0 / math.sqrt(ux * ux + uy * uy + uz * uz)
+    ux, uy, uz = ux * k, uy * k, uz * k
+    ex, ey, ez = cross(wx, wy, wz, bx, by, bz)
+    sx, sy, sz = vx + ex, vy + ey, vz + ez
+    along = ux * sx + uy * sy + uz * sz
+    for c in range(12):
+        a = c % 3
+        hx, hy, hz = 1.0 * (a == 0), 1.0 * (a == 1), 1.0 * (a == 2)
+        px, py, pz = 0.0, 0.0, 0.0
+        if c < 3:
+            dx, dy, dz = -R[a, 0], -R[a, 1], -R[a, 2]
+        elif c < 6:
+            # A vector of the world in body axes turns by v x theta
+            dx, dy, dz = cross(fx, fy, fz, hx, hy, hz)
+            px, py, pz = cross(vx, vy, vz, hx, hy, hz)
+        elif c < 9:
+            dx, dy, dz = R[a, 0], R[a, 1], R[a, 2]
+        else:
+            dx, dy, dz = -hx, -hy, -hz
+            px, py, pz = cross(wx, wy, wz, hx, hy, hz)
+        change = ux * dx + uy * dy + uz * dz
+        longer[c] = change
+        faster[c] = -(k * (dx * sx + dy * sy + dz * sz - change * along) + ux * px + uy * py + uz * pz)
+
+
+@njit(cache=True)
+def _add_ceiling_changes(physics, n, offset, x, R, columns, defect, rate_defect):  # type: ignore[no-untyped-def]
+    """Add to (m,) each what the internal coordinates of ``columns`` do to the cable at ``offset``."""
+    xc = x.astype(np.complex128)
+    pc = physics.astype(np.complex128)
+    Rc = R.astype(np.complex128)
+    gc = np.empty(6, dtype=np.complex128)
+    for d in range(BODY_STATE, x.shape[0]):
+        xc[d] = complex(x[d], STEP)
+        length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
+        for c in range(columns.shape[1]):
+            defect[c] += length.imag / STEP * columns[d, c]
+            rate_defect[c] += speed.imag / STEP * columns[d, c]
+        xc[d] = x[d]
+
+
+@njit(cache=True)
 def project_columns(physics, modes, x, reference, directions, first_direction, columns):  # type: ignore[no-untyped-def]
-    """Move sensitivity columns (12 + 2 s, m) of a projected state to the manifold's tangent.
+    """Move sensitivity columns (12 + 2 s, m) of a projected state, phi = 0, to the manifold's tangent.
 
     Column ``first_direction + k`` is the derivative in physics[directions[k]]
     (directions below 0 touch no geometry); the others in quantities that touch none.
@@ -174,39 +238,24 @@ def project_columns(physics, modes, x, reference, directions, first_direction, c
     slope = np.zeros((count, 6))
     defect = np.zeros((count, m))
     rate_defect = np.zeros((count, m))
-    xc = x.astype(np.complex128)
-    pc = physics.astype(np.complex128)
-    Rc = reference.astype(np.complex128)
-    gc = np.empty(6, dtype=np.complex128)
+    longer, faster = np.empty(12), np.empty(12)
     row = 0
     for i in range(n):
         if modes[i] != RIGID:
             continue
         offset = CABLES + CABLE_SIZE * i
+        _length_changes(physics, n, i, x, reference, longer, faster)
         for d in range(6):
-            xc[d] = complex(x[d], STEP)
-            rotation(reference, xc, Rc)
-            _, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
-            slope[row, d] = speed.imag / STEP
-            xc[d] = x[d]
-        rotation(reference, xc, Rc)
+            slope[row, d] = faster[d]
         for k in range(directions.shape[0]):
-            d = directions[k]
-            if offset <= d < offset + LENGTH:
-                pc[d] = complex(physics[d], STEP)
-                length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
-                defect[row, first_direction + k] = length.imag / STEP
-                rate_defect[row, first_direction + k] = speed.imag / STEP
-                pc[d] = physics[d]
-            elif d == offset + LENGTH:
+            number = directions[k] - offset
+            if 0 <= number < LENGTH:
+                defect[row, first_direction + k] = longer[6 + number]
+                rate_defect[row, first_direction + k] = faster[6 + number]
+            elif number == LENGTH:
                 defect[row, first_direction + k] = -1.0
-        for d in range(BODY_STATE, x.shape[0]):
-            xc[d] = complex(x[d], STEP)
-            length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
-            for c in range(m):
-                defect[row, c] += length.imag / STEP * columns[d, c]
-                rate_defect[row, c] += speed.imag / STEP * columns[d, c]
-            xc[d] = x[d]
+        if x.shape[0] > BODY_STATE:
+            _add_ceiling_changes(physics, n, offset, x, reference, columns, defect[row], rate_defect[row])
         row += 1
     _subtract_projection(G, plus, count, defect, columns, 0)
     for row in range(count):

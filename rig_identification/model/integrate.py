@@ -1,8 +1,12 @@
-"""Motion: Runge-Kutta of fourth order on the rotation group; and how its accelerations change.
+"""Motion and its exact derivatives: Runge-Kutta of fourth order on the rotation group.
 
 Each step integrates the local state of dynamics.py from a fresh reference rotation
-(Munthe-Kaas, "High order Runge-Kutta methods on manifolds", 1999) and goes back to the cable
-lengths. What a change of state, wrench or ``physics`` does to the motion: variation.py.
+(Munthe-Kaas, "High order Runge-Kutta methods on manifolds", 1999), goes back to the cable
+lengths, and carries sensitivity columns through the same four stages. Columns are kept
+per node interval as
+    x_{k+1} = A_k x_k + B_k w_k + C_k p        (first-order, about the motion)
+with w a wrench held over the interval and p the chosen entries of ``physics``, so that
+filters (noise that enters as force) and parameter derivatives share one pass.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from numba import njit
 from rig_identification.model.arithmetic import STEP, eliminate, invert
 from rig_identification.model.constraints import (
     cable_length_and_rate,
+    project_columns,
     project_state,
     update_reference,
 )
@@ -188,6 +193,89 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
 
 
 @njit(cache=True, nogil=True)
+def _stage_columns(x, R, z, dz, columns, slopes):  # type: ignore[no-untyped-def]
+    """slopes (12 + 2 s, m) = d(dx/dt) for stage columns (12 + 2 s, m): state, wrench, physics blocks."""
+    m = columns.shape[1]
+    states = x.shape[0]
+    internal = (states - BODY_STATE) // 2
+    behind = z.shape[0] - internal - 6
+    # z responds to the state through dz's first columns, and directly to wrench and physics
+    for c in range(m):
+        for i in range(3):
+            slopes[i, c] = columns[VELOCITY + i, c]
+    response = np.zeros((6 + internal, m))
+    for i in range(6 + internal):
+        row = i if i < 6 else i + behind
+        for d in range(states):
+            g = dz[row, d]
+            if g != 0.0:
+                for c in range(m):
+                    response[i, c] += g * columns[d, c]
+        for c in range(states, m):
+            response[i, c] += dz[row, c]
+    for j in range(internal):
+        for c in range(m):
+            slopes[BODY_STATE + j, c] = columns[BODY_STATE + internal + j, c]
+            slopes[BODY_STATE + internal + j, c] = response[6 + j, c]
+    # dv/dt = R A: change of A, and of R: R (dtheta x A), dtheta = J_r(phi) dphi ~ dphi - phi x dphi / 2
+    p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
+    w0, w1, w2 = x[RATE], x[RATE + 1], x[RATE + 2]
+    t = p0 * p0 + p1 * p1 + p2 * p2
+    c2 = 0.5 - t / 24.0
+    c3 = 1.0 / 6.0 - t / 120.0
+    k = 1.0 / 12.0 + t / 720.0
+    for c in range(m):
+        f0, f1, f2 = columns[ROTATION, c], columns[ROTATION + 1, c], columns[ROTATION + 2, c]
+        q0 = p1 * f2 - p2 * f1
+        q1 = p2 * f0 - p0 * f2
+        q2 = p0 * f1 - p1 * f0
+        t0 = f0 - c2 * q0 + c3 * (p1 * q2 - p2 * q1)
+        t1 = f1 - c2 * q1 + c3 * (p2 * q0 - p0 * q2)
+        t2 = f2 - c2 * q2 + c3 * (p0 * q1 - p1 * q0)
+        r0 = response[0, c] + t1 * z[2] - t2 * z[1]
+        r1 = response[1, c] + t2 * z[0] - t0 * z[2]
+        r2 = response[2, c] + t0 * z[1] - t1 * z[0]
+        for i in range(3):
+            slopes[VELOCITY + i, c] = R[i, 0] * r0 + R[i, 1] * r1 + R[i, 2] * r2
+            slopes[RATE + i, c] = response[3 + i, c]
+        # dphi/dt = w + phi x w / 2 + k phi x (phi x w)
+        g0, g1, g2 = columns[RATE, c], columns[RATE + 1, c], columns[RATE + 2, c]
+        s0 = p1 * w2 - p2 * w1
+        s1 = p2 * w0 - p0 * w2
+        s2 = p0 * w1 - p1 * w0
+        d0 = f1 * w2 - f2 * w1 + p1 * g2 - p2 * g1
+        d1 = f2 * w0 - f0 * w2 + p2 * g0 - p0 * g2
+        d2 = f0 * w1 - f1 * w0 + p0 * g1 - p1 * g0
+        dk = (p0 * f0 + p1 * f1 + p2 * f2) / 360.0
+        slopes[ROTATION, c] = (
+            g0 + 0.5 * d0 + k * (f1 * s2 - f2 * s1 + p1 * d2 - p2 * d1) + dk * (p1 * s2 - p2 * s1)
+        )
+        slopes[ROTATION + 1, c] = (
+            g1 + 0.5 * d1 + k * (f2 * s0 - f0 * s2 + p2 * d0 - p0 * d2) + dk * (p2 * s0 - p0 * s2)
+        )
+        slopes[ROTATION + 2, c] = (
+            g2 + 0.5 * d2 + k * (f0 * s1 - f1 * s0 + p0 * d1 - p1 * d0) + dk * (p0 * s1 - p1 * s0)
+        )
+
+
+@njit(cache=True, nogil=True)
+def _absorb_rotation_columns(x, columns):  # type: ignore[no-untyped-def]
+    """Turn columns of phi into columns of the right rotation increment of R_ref Exp(phi)."""
+    p0, p1, p2 = x[ROTATION], x[ROTATION + 1], x[ROTATION + 2]
+    t = p0 * p0 + p1 * p1 + p2 * p2
+    c2 = 0.5 - t / 24.0
+    c3 = 1.0 / 6.0 - t / 120.0
+    for c in range(columns.shape[1]):
+        f0, f1, f2 = columns[ROTATION, c], columns[ROTATION + 1, c], columns[ROTATION + 2, c]
+        q0 = p1 * f2 - p2 * f1
+        q1 = p2 * f0 - p0 * f2
+        q2 = p0 * f1 - p1 * f0
+        columns[ROTATION, c] = f0 - c2 * q0 + c3 * (p1 * q2 - p2 * q1)
+        columns[ROTATION + 1, c] = f1 - c2 * q1 + c3 * (p2 * q0 - p0 * q2)
+        columns[ROTATION + 2, c] = f2 - c2 * q2 + c3 * (p0 * q1 - p1 * q0)
+
+
+@njit(cache=True, nogil=True)
 def _write_outputs(physics, modes, R, x, z, out):  # type: ignore[no-untyped-def]
     n = modes.shape[0]
     block = CABLES + CABLE_SIZE * n
@@ -205,6 +293,45 @@ def _write_outputs(physics, modes, R, x, z, out):  # type: ignore[no-untyped-def
         out[OUT_TENSION + i] = z[6 + i]
         if physics.shape[0] > block:
             out[OUT_TENSION + i] += weight_below_cell(physics, block, modes, i, x, R)
+
+
+@njit(cache=True, nogil=True)
+def _write_output_columns(physics, states, R, dz, directions, out):  # type: ignore[no-untyped-def]
+    """out (OUT_TENSION + n, states + 6 + d): derivative of raw outputs in state, wrench, physics."""
+    n = out.shape[0] - OUT_TENSION
+    m = dz.shape[1]
+    for i in range(OUT_TENSION):
+        for c in range(m):
+            out[i, c] = 0.0
+    g = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            g[i] += R[j, i] * physics[GRAVITY + j]
+    for i in range(3):
+        out[OUT_POSITION + i, i] = 1.0
+        out[OUT_ROTATION + i, ROTATION + i] = 1.0
+        out[OUT_RATE + i, RATE + i] = 1.0
+        for c in range(m):
+            out[OUT_SPECIFIC_FORCE + i, c] = dz[i, c]
+            out[OUT_ANGULAR_ACCELERATION + i, c] = dz[3 + i, c]
+    # d(R^T g) = (R^T g) x dtheta + R^T dg
+    out[OUT_GRAVITY, ROTATION + 1] = -g[2]
+    out[OUT_GRAVITY, ROTATION + 2] = g[1]
+    out[OUT_GRAVITY + 1, ROTATION] = g[2]
+    out[OUT_GRAVITY + 1, ROTATION + 2] = -g[0]
+    out[OUT_GRAVITY + 2, ROTATION] = -g[1]
+    out[OUT_GRAVITY + 2, ROTATION + 1] = g[0]
+    for k in range(directions.shape[0]):
+        d = directions[k]
+        if GRAVITY <= d < GRAVITY + 3:
+            for i in range(3):
+                out[OUT_GRAVITY + i, states + WRENCH + k] = R[d - GRAVITY, i]
+    for i in range(3):
+        for c in range(m):
+            out[OUT_SPECIFIC_FORCE + i, c] -= out[OUT_GRAVITY + i, c]
+    for i in range(n):
+        for c in range(m):
+            out[OUT_TENSION + i, c] = dz[6 + i, c]
 
 
 @njit(cache=True, nogil=True)
@@ -229,16 +356,6 @@ def _switch_cables(physics, modes, x, reference, z, can_slacken):  # type: ignor
 
 
 @njit(cache=True, nogil=True)
-def exciter_at(forces, force_rates, force_middles, node, at, force, rate):  # type: ignore[no-untyped-def]
-    """force, rate (3,): of the exciter at a share ``at`` of the interval that begins at ``node``."""
-    following = min(node + 1, forces.shape[0] - 1)
-    for i in range(3):
-        force[i] = forces[node, i] + at * (forces[following, i] - forces[node, i])
-        force[i] += 4.0 * at * (1.0 - at) * force_middles[node, i]
-        rate[i] = force_rates[node, i] + at * (force_rates[following, i] - force_rates[node, i])
-
-
-@njit(cache=True, nogil=True)
 def propagate(  # type: ignore[no-untyped-def]
     physics,
     modes,
@@ -252,12 +369,17 @@ def propagate(  # type: ignore[no-untyped-def]
     wrenches,
     step,
     substeps,
+    directions,
+    start_columns,
+    sensitivity,
     nodes_x,
     nodes_R,
     nodes_out,
-    line_x,
-    line_R,
-    line_modes,
+    A,
+    B,
+    H,
+    D,
+    J,
 ):
     """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
 
@@ -265,20 +387,24 @@ def propagate(  # type: ignore[no-untyped-def]
     forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between;
     force_middles (N, 3): what the force has midway to the next node beyond that line (a parabola).
     wrenches (N, 6): further wrench,
-    body axes, held over the interval.
-    Filled: nodes_x (N, X), X = 12 + 2 s, nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and for
-    variation.py the motion at the 2 L points that begin and halve L equal parts of each interval, none
-    where L is zero, which ``substeps`` is a multiple of: line_x (N, 2 L, X) with phi = 0, line_R
-    (N, 2 L, 3, 3) and line_modes (N, 2 L, n).
+    body axes, held over the interval. directions (d,): entries of ``physics`` to
+    differentiate in (EXCITER_CLOCK: clock). start_columns (X, b + d): derivative of the
+    start state, X = 12 + 2 s, in b start coordinates and the d directions.
+    Filled: nodes_x (N, X), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and where
+    ``sensitivity``: A (N, X, X), B (N, X, 6), H (N, OUT_TENSION + n, X), D (N, OUT_TENSION + n, 6), and
+    J (N, OUT_TENSION + n, b + d), total derivatives of the raw outputs.
     """
     nodes = forces.shape[0]
     n = modes.shape[0]
     states = x.shape[0]
     internal = (states - BODY_STATE) // 2
     size = 6 + n + internal
+    d = directions.shape[0]
+    local = states + WRENCH + d
+    starts = start_columns.shape[1] - d
     K = np.empty((size, size))
     r = np.empty(size)
-    inverse = np.empty((0, size))
+    inverse = np.empty((size if sensitivity else 0, size))
     z = np.empty(size)
     R = np.empty((3, 3))
     k = np.empty((4, states))
@@ -289,16 +415,30 @@ def propagate(  # type: ignore[no-untyped-def]
     h = step / substeps
     weights = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
     ahead = np.array([0.0, 0.5, 0.5, 1.0])
-    # Points in halves of a substep: in the middle of an odd number of substeps there is none
-    apart = 0 if line_x.shape[1] == 0 else 2 * substeps // line_x.shape[1]
+    dz = np.empty((size, local if sensitivity else 0))
+    columns = np.zeros((states, local if sensitivity else 0))
+    stage = np.zeros((states, local if sensitivity else 0))
+    slopes = np.empty((4, states, local if sensitivity else 0))
+    out_columns = np.empty((OUT_TENSION + n, local if sensitivity else 0))
+    S = start_columns.copy()
     for node in range(nodes):
         last = node == nodes - 1
         wrench = wrenches[node]
+        if sensitivity:
+            columns[:, :] = 0.0
+            for i in range(states):
+                columns[i, i] = 1.0
         for sub in range(1 if last else substeps):
             for s in range(4):
                 for i in range(states):
                     y[i] = x[i] + (h * ahead[s] * k[s - 1, i] if s > 0 else 0.0)
-                exciter_at(forces, force_rates, force_middles, node, (sub + ahead[s]) / substeps, force, rate)
+                at = (sub + ahead[s]) / substeps
+                for i in range(3):
+                    after = forces[node, i] if last else forces[node + 1, i]
+                    force[i] = forces[node, i] + at * (after - forces[node, i])
+                    force[i] += 4.0 * at * (1.0 - at) * force_middles[node, i]
+                    rate_after = force_rates[node, i] if last else force_rates[node + 1, i]
+                    rate[i] = force_rates[node, i] + at * (rate_after - force_rates[node, i])
                 rotation(reference, y, R)
                 if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
                     return node
@@ -308,19 +448,21 @@ def propagate(  # type: ignore[no-untyped-def]
                     rotation(reference, y, R)
                     if not solve(physics, modes, mount, y, R, force, wrench, K, r, inverse, z):
                         return node
+                if sensitivity:
+                    linearise(physics, modes, mount, reference, y, force, rate, z, inverse, directions, dz)
                 if s == 0 and sub == 0:
                     nodes_x[node] = y
                     nodes_R[node] = R
                     _write_outputs(physics, modes, R, y, z, nodes_out[node])
-                halves = 2 * sub + (0 if s == 0 else 1)
-                if apart > 0 and (s == 0 or s == 2) and halves % apart == 0:
-                    point = halves // apart
-                    line_x[node, point] = y
-                    line_x[node, point, ROTATION : ROTATION + 3] = 0.0
-                    line_R[node, point] = R
-                    line_modes[node, point] = modes
-                if s == 0 and last:
-                    return nodes
+                    if sensitivity:
+                        _write_output_columns(physics, states, R, dz, directions, out_columns)
+                        H[node] = out_columns[:, :states]
+                        D[node] = out_columns[:, states : states + WRENCH]
+                        total = np.dot(np.ascontiguousarray(out_columns[:, :states]), S)
+                        total[:, starts:] += out_columns[:, states + WRENCH :]
+                        J[node] = total
+                    if last:
+                        return nodes
                 rotation_rate(y, phi_rate)
                 for i in range(3):
                     k[s, i] = y[VELOCITY + i]
@@ -330,6 +472,14 @@ def propagate(  # type: ignore[no-untyped-def]
                 for i in range(internal):
                     k[s, BODY_STATE + i] = y[BODY_STATE + internal + i]
                     k[s, BODY_STATE + internal + i] = z[6 + n + i]
+                if sensitivity:
+                    if s == 0:
+                        stage[:, :] = columns
+                    else:
+                        for i in range(states):
+                            for c in range(local):
+                                stage[i, c] = columns[i, c] + h * ahead[s] * slopes[s - 1, i, c]
+                    _stage_columns(y, R, z, dz, stage, slopes[s])
             for i in range(states):
                 total_rate = 0.0
                 for s in range(4):
@@ -337,6 +487,19 @@ def propagate(  # type: ignore[no-untyped-def]
                 x[i] += h * total_rate
                 if not abs(x[i]) < 1e6:
                     return node
+            if sensitivity:
+                for s in range(4):
+                    for i in range(states):
+                        for c in range(local):
+                            columns[i, c] += h * weights[s] * slopes[s, i, c]
+                _absorb_rotation_columns(x, columns)
             update_reference(reference, x)
             project_state(physics, modes, x, reference)
+            if sensitivity:
+                project_columns(physics, modes, x, reference, directions, states + WRENCH, columns)
+        if sensitivity:
+            A[node] = columns[:, :states]
+            B[node] = columns[:, states : states + WRENCH]
+            S = np.dot(np.ascontiguousarray(columns[:, :states]), S)
+            S[:, starts:] += columns[:, states + WRENCH :]
     return nodes

@@ -22,7 +22,6 @@ from rig_identification.model.effects.place import (
     internal_block,
 )
 from rig_identification.model.integrate import propagate
-from rig_identification.model.variation import chain, vary
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -250,19 +249,6 @@ def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> in
     return max(plain, int(np.ceil(step * omega / 0.5)))
 
 
-#: Parts of a node interval, at most, over each of which the linearised equations are a parabola: they change
-#: with the swing, not with a stiff cable's own ringing.
-LINES = 2
-
-
-def lines_for(model: RigModel, substeps: int) -> int:
-    """Parts of a node interval at whose ends and middles the equations are linearised."""
-    stops = any(
-        model.physics[internal_block(model.cables, k) + layout.STOP] > 0.0 for k in range(model.internal)
-    )
-    return substeps if stops else min(substeps, LINES)
-
-
 def _fastest_internal(model: RigModel) -> float:
     """Highest angular frequency (rad/s) of the internal coordinates."""
     fastest = 0.0
@@ -298,68 +284,36 @@ def simulate(
     columns[:, : basis.shape[1]] = basis
     project_columns(model.physics, model.modes, x, R, chosen, basis.shape[1], columns)
     nodes, outputs = drive.force.shape[0], layout.OUT_TENSION + model.cables
-    steps = substeps or substeps_for(model, drive.step, FIT_STEP if sensitivity else FINE_STEP)
-    lines = lines_for(model, steps) if sensitivity else 0
-    steps = steps if lines == 0 else lines * -(-steps // lines)
+    kept = nodes if sensitivity else 0
     states, rotations = np.zeros((nodes, size)), np.zeros((nodes, 3, 3))
     out = np.zeros((nodes, outputs))
-    line_x, line_R = np.zeros((nodes, 2 * lines, size)), np.zeros((nodes, 2 * lines, 3, 3))
-    line_modes = np.zeros((nodes, 2 * lines, model.cables), dtype=model.modes.dtype)
-    force, force_rate = np.ascontiguousarray(drive.force), np.ascontiguousarray(drive.force_rate)
-    middle = np.zeros_like(drive.force) if drive.middle is None else np.ascontiguousarray(drive.middle)
-    wrench = np.ascontiguousarray(drive.wrench)
-    mount = model.exciter_orientation
+    A, B = np.zeros((kept, size, size)), np.zeros((kept, size, 6))
+    H, D = np.zeros((kept, outputs, size)), np.zeros((kept, outputs, 6))
+    J = np.zeros((kept, outputs, columns.shape[1]))
     done = propagate(
         model.physics,
         model.modes.copy(),
         model.can_slacken,
-        mount,
+        model.exciter_orientation,
         x,
         R,
-        force,
-        force_rate,
-        middle,
-        wrench,
+        np.ascontiguousarray(drive.force),
+        np.ascontiguousarray(drive.force_rate),
+        np.zeros_like(drive.force) if drive.middle is None else np.ascontiguousarray(drive.middle),
+        np.ascontiguousarray(drive.wrench),
         drive.step,
-        steps,
+        substeps or substeps_for(model, drive.step, FIT_STEP if sensitivity else FINE_STEP),
+        chosen,
+        columns,
+        sensitivity,
         states,
         rotations,
         out,
-        line_x,
-        line_R,
-        line_modes,
-    )
-    motion = Motion(drive.step, states, rotations, out, int(done))
-    if not sensitivity or not motion.complete:
-        return motion
-    starts = basis.shape[1]
-    A, B, C = np.zeros((nodes, size, size)), np.zeros((nodes, size, 6)), np.zeros((nodes, size, chosen.size))
-    H, D = np.zeros((nodes, outputs, size)), np.zeros((nodes, outputs, 6))
-    J = np.zeros((nodes, outputs, columns.shape[1]))
-    varied = vary(
-        model.physics,
-        mount,
-        force,
-        force_rate,
-        middle,
-        wrench,
-        drive.step,
-        steps,
-        chosen,
-        line_x,
-        line_R,
-        line_modes,
-        0,
-        nodes,
-        starts,
         A,
         B,
-        C,
         H,
         D,
         J,
     )
-    if not varied:
-        return replace(motion, nodes=0)
-    chain(A, C, H, columns, starts, J)
-    return replace(motion, A=A, B=B, H=H, D=D, J=J)
+    derivatives = (A, B, H, D, J) if sensitivity else (None,) * 5
+    return Motion(drive.step, states, rotations, out, int(done), *derivatives)

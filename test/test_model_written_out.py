@@ -1,0 +1,70 @@
+"""Columns that are written out (state_columns.py, number_columns.py) against the complex step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from test_model_internal import ceiling
+from test_model_rigs import random_sample
+
+from rig_identification.model import layout
+from rig_identification.model.dynamics import assemble, rotation
+from rig_identification.model.integrate import EXCITER_CLOCK, linearise, solve
+
+Array = NDArray[np.float64]
+
+
+@pytest.mark.parametrize("mode", [layout.RIGID, layout.ELASTIC, layout.ELASTIC_ROD, layout.SLACK])
+@pytest.mark.parametrize("yielding", [False, True], ids=["plain", "ceiling"])
+def test_what_is_written_out_is_what_the_complex_step_gives(mode: int, yielding: bool) -> None:
+    """dz of the equations' right-hand side, for every entry of state and physics, to rounding."""
+    sample = random_sample(3, 4)
+    model = sample.model(axial_stiffness=2e6)
+    physics = model.physics.copy()
+    physics[layout.EXCITER_ROTATION : layout.EXCITER_ROTATION + 3] = 0.02, -0.01, 0.03
+    for i in range(model.cables):
+        physics[layout.cable_offset(i) + layout.AXIAL_DAMPING] = 1e-3
+        # All of them pull
+        physics[layout.cable_offset(i) + layout.LENGTH] -= 2e-3
+    model = model.with_physics(physics)
+    if yielding:
+        model = model.with_internal(ceiling(2e-6, np.array([[0.6, 0.0, 0.8]]), 4.0, 0.05))
+    modes = np.full(model.cables, layout.RIGID)
+    modes[1] = mode
+    rng = np.random.default_rng(8)
+    x = rng.normal(0.0, 0.3, model.states)
+    x[:3] = sample.start.position
+    x[layout.ROTATION : layout.ROTATION + 3] = 0.02, 0.01, -0.03
+    R_reference = np.array(sample.start.R_world_body, order="C")
+    force, rate, wrench = rng.normal(0.0, 100.0, 3), rng.normal(0.0, 900.0, 3), rng.normal(0.0, 10.0, 6)
+    size = 6 + model.cables + model.internal
+    K, r = np.empty((size, size)), np.empty(size)
+    inverse, z, R = np.empty((size, size)), np.empty(size), np.empty((3, 3))
+    rotation(R_reference, x, R)
+    mount = model.exciter_orientation
+    assert solve(model.physics, modes, mount, x, R, force, wrench, K, r, inverse, z)
+    entries = np.array([*range(layout.effects_offset(model.cables)), EXCITER_CLOCK])
+    dz = np.empty((size, model.states + 6 + entries.size))
+    linearise(model.physics, modes, mount, R_reference, x, force, rate, z, inverse, entries, dz)
+
+    def by_complex_step(entry: int, of_state: bool) -> Array:
+        xc, pc, fc = x.astype(complex), model.physics.astype(complex), force.astype(complex)
+        if of_state:
+            xc[entry] += 1e-30j
+        elif entry == EXCITER_CLOCK:
+            fc += 1e-30j * rate
+        else:
+            pc[entry] += 1e-30j
+        Kc, rc, Rc = np.empty((size, size), complex), np.empty(size, complex), np.empty((3, 3), complex)
+        rotation(R_reference.astype(complex), xc, Rc)
+        assemble(pc, modes, mount, xc, Rc, fc, wrench, Kc, rc)
+        return np.asarray(inverse @ ((rc - Kc @ z).imag / 1e-30))
+
+    for column in range(model.states):
+        exact = by_complex_step(column, True)
+        np.testing.assert_allclose(dz[:, column], exact, rtol=1e-9, atol=1e-9 * np.max(np.abs(exact)) + 1e-9)
+    for k, entry in enumerate(entries):
+        exact = by_complex_step(int(entry), False)
+        found = dz[:, model.states + 6 + k]
+        np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * np.max(np.abs(exact)) + 1e-12)
