@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,27 @@ LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 
 #: Files of long tests that share no fixture: any worker may take any of them.
 FREELY_SPREAD = {"test_estimate_fit", "test_model_agreement", "test_model_conservation"}
+
+
+#: An answer to a short session, whose forward model is compiled for it and kept beside the package.
+COMPILED_ONCE = """
+import numpy as np
+from test_simulate_identify import shaken
+
+from rig_identification.mismatch.identify import identify
+from rig_identification.simulate import simulate_session
+
+identify(simulate_session(shaken(14), np.random.default_rng(1))[0])
+"""
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile once for all workers and nodes: each would for itself, minutes long and all at once."""
+    alone = not session.config.getoption("numprocesses", None)
+    if alone or hasattr(session.config, "workerinput") or session.config.option.collectonly:
+        return
+    here = Path(__file__).parent
+    subprocess.run([sys.executable, "-c", COMPILED_ONCE], cwd=here, check=False)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -49,8 +49,7 @@ def test_a_gentle_push_is_found_in_a_fitted_run_and_in_one_held_out(pushed: str)
     ("pushed", "bias", "push"),
     [
         ("run_1", 0.006, 4.0),  # the fit of the ideal model fails by a little, and whole runs show the push
-        ("run_1", 0.012, PUSH),  # by far, and a short piece shows it
-        ("run_2", 0.012, PUSH),  # which no fitted piece does
+        ("run_2", 0.012, PUSH),  # by far, and no fitted piece shows it
     ],
 )
 def test_a_gentle_push_is_found_beside_an_error_that_shows_more(

@@ -88,8 +88,7 @@ def test_a_signal_during_the_first_start_after_installation_is_heeded_at_once(
     assert output in ("", f"{name}: compiles its machine code, once after installation: some minutes\n")
 
 
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("number", "storage"), [(signal.SIGINT, "mcap"), (signal.SIGTERM, "sqlite3")])
 def test_a_signal_while_recording_leaves_the_recording_whole(
     graph: Graph, probe: Probe, number: int, storage: str
 ) -> None:

@@ -96,8 +96,8 @@ def headings(rig: Rig, run: Run) -> list[float]:
 
     A body on two cables tilts about the line e of its hinges as it swings across it: the
     horizontal rotation follows the displacement as r = e (n . d)/h, n = z x e, so that e is the
-    left singular vector of the regression of r on d (its sign stays open). Otherwise a
-    round of eight.
+    left singular vector of the regression of r on d. Its sign stays open: a body on two cables swings
+    alike turned by half a circle, and the smaller turn comes first. Otherwise a round of eight.
     """
     if rig.mocap is not None:
         return [0.0]
@@ -113,7 +113,8 @@ def headings(rig: Rig, run: Run) -> list[float]:
     e = np.linalg.svd(slope)[0][:, 0]
     along = rig.cables[1].body_point - rig.cables[0].body_point
     angle = np.arctan2(e[1], e[0]) - np.arctan2(along[1], along[0])
-    return [float(angle), float(angle + np.pi)]
+    either = np.mod(angle + np.array([0.0, np.pi]) + np.pi, 2.0 * np.pi) - np.pi
+    return [float(a) for a in sorted(either, key=abs)]
 
 
 def mocap_mount(rig: Rig, run: Run, rest: State, heading: float) -> sensors.MocapMount:

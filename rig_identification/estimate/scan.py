@@ -17,7 +17,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent, headings, mocap_mount, rest_of, start_from_mocap
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
-from rig_identification.estimate.solve import Point, Problem, solve
+from rig_identification.estimate.solve import ROUNDING, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
 from rig_identification.model.sensors import MOCAP_SIZE
@@ -67,11 +67,14 @@ def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], dep
 
 
 def _best(piece: Run, tried):  # type: ignore[no-untyped-def]
-    """The one of (bench, theta, rest, start, heading) that fits best, with its own best start."""
+    """The one of (bench, theta, rest, start, heading) that fits best, with its own best start.
+
+    Of those that no recording tells apart the first one: rounding is no reason.
+    """
     best, kept = np.inf, None
     for bench, theta, rest, start, heading in tried:
         found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
-        if found is not None and found[0].cost < best:
+        if found is not None and (kept is None or found[0].cost < best - ROUNDING * abs(best)):
             best, kept = found[0].cost, (bench, theta, rest, found[1], heading)
     return kept
 
