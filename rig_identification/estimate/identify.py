@@ -366,7 +366,8 @@ def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
         points.insert(0, fitted.guess)
     for point in points:
         pieces, start = in_pieces(fitted.problem, point.theta, fitted.rest, point.rest_guesses)
-        careful = solve_cautiously(pieces, start, hasty=True)
+        # What is only watched has no search that goes on from here: these weights are what it is told with
+        careful = solve_cautiously(pieces, start, hasty=not only_watched(fitted.problem))
         again = evaluate(pieces, careful[1].point)
         if again is not None and misfit(again) <= misfit(fitted.evaluation):
             # Pieces fit no worse than the whole: the way from there did not get lost
