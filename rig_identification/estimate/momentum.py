@@ -21,7 +21,7 @@ from rig_identification.estimate.prediction import drive, exciter_wrench_map
 from rig_identification.estimate.sampling import node_values
 from rig_identification.estimate.track import Track
 from rig_identification.model import layout
-from rig_identification.model.body import complex_step_jacobian, linear_from_log_cholesky
+from rig_identification.model.body import linear_from_log_cholesky, linear_in_log_cholesky
 from rig_identification.model.so3 import skew
 
 Array = NDArray[np.float64]
@@ -123,7 +123,7 @@ def regress(balances: list[tuple[Array, Array]], theta: Array, weak: Array) -> t
     guess = theta.copy()
     for _ in range(REGRESSION_STEPS):
         miss = right - rows @ linear_from_log_cholesky(theta)
-        slope = rows @ complex_step_jacobian(linear_from_log_cholesky, theta)
+        slope = rows @ linear_in_log_cholesky(theta)
         spread = spreads(miss)[kind]
         slope, miss = slope / spread[:, None], miss / spread
         normal = slope.T @ slope + np.diag(1.0 / weak**2)

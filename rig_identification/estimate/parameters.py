@@ -391,7 +391,7 @@ class ParameterSet:
     @cached_property
     def _directions(self) -> NDArray[np.int64]:
         moved = set(range(layout.INERTIAL, layout.INERTIAL + INERTIAL))
-        moved |= {entry for p in self.free if p.kind == "physics" for entry in (p.index, *p.also)}
+        moved |= set(self._entries["physics"][1].tolist())
         if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
             moved.add(layout.GRAVITY + 2)
         clock = [EXCITER_CLOCK] if any(p.name in EXCITER_TIMES for p in self.free) else []

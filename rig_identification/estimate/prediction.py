@@ -228,10 +228,9 @@ def _channel_rows(
     own_map = own_map.reshape(groups, width, free.size)
     for k, i in enumerate(free):
         out[:, :, 1 + columns[i]] += scale[i] * own_map[:, :, k]
-    for entry, late_by in ((clock, values), (lag, None)):
-        for i in np.flatnonzero(entries == entry):
-            shown = lagged(step, tau, values) if late_by is None else late_by
-            out[:, :, 1 + columns[i]] -= scale[i] * (slope @ shown)
+    for i in np.flatnonzero((entries == clock) | (entries == lag)):
+        shown = values if entries[i] == clock else lagged(step, tau, values)
+        out[:, :, 1 + columns[i]] -= scale[i] * (slope @ shown)
     return out, H, D
 
 
@@ -289,8 +288,8 @@ def linearise_run(
     in_physics = parameters.physics_jacobian(theta)[: directions.size]
     starts = basis.shape[1]
     known = 0 if start_only else parameters.size
-    size = sum(c.node.size * c.width for c in run.channels)
-    which = np.repeat(np.arange(len(run.channels)), [c.node.size * c.width for c in run.channels])
+    rows_of = [c.node.size * c.width for c in run.channels]
+    size, which = sum(rows_of), np.repeat(np.arange(len(rows_of)), rows_of)
     shown = [_shown_at(run, c, own, parameters) for c in run.channels]
     nodes = [
         np.zeros(0, dtype=np.int64),

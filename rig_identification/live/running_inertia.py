@@ -23,6 +23,7 @@ from rig_identification.model.body import (
     elements_from_linear,
     linear_from_elements,
     linear_from_log_cholesky,
+    linear_in_log_cholesky,
     log_cholesky_from_linear,
 )
 from rig_identification.recording import Session
@@ -139,7 +140,7 @@ class RunningInertia:
         spread = (
             np.repeat([np.sqrt(np.mean(miss[:, :3] ** 2)), np.sqrt(np.mean(miss[:, 3:] ** 2))], 3) + 1e-12
         )
-        slope = (rows @ complex_step_jacobian(linear_from_log_cholesky, theta)) / spread[:, None]
+        slope = (rows @ linear_in_log_cholesky(theta)) / spread[:, None]
         scores = np.einsum("kij,ki->kj", slope, miss / spread)
         normal = np.einsum("kij,kil->jl", slope, slope) + np.diag(1.0 / self._weak**2)
         scatter = scores.T @ scores

@@ -190,9 +190,9 @@ class Look:
             return
         self.notify("along the motion that was measured")
         along = self.alone.measured(self.candidates)
-        soon = [p for p in along.worthy if along.beyond or not p.candidate.slow]
-        self.slowly = [p for p in along.worthy if p not in soon]
-        self._fit_as_described(soon)
+        worthy = along.worthy
+        self.slowly = [] if along.beyond else [p for p in worthy if p.candidate.slow]
+        self._fit_as_described([p for p in worthy if along.beyond or not p.candidate.slow])
         if along.beyond and not self.enough and not self.almost:
             sure = {p.candidate.label for p in along.sure}
             self.certain = self._contradicting([t for t in self.tried if t.candidate.label in sure])

@@ -10,12 +10,11 @@ parameter p as well.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
 from rig_identification.model.arithmetic import STEP, invert, reciprocal, root
+from rig_identification.model.cable_line import cable_line, cross, hinge_change, line_change
 from rig_identification.model.dynamics import rotation
 from rig_identification.model.effects.internal import ceiling_shift
 from rig_identification.model.layout import (
@@ -30,7 +29,6 @@ from rig_identification.model.layout import (
     ROTATION,
     VELOCITY,
 )
-from rig_identification.model.state_columns import cross, in_body
 
 
 @njit(cache=True)
@@ -161,45 +159,21 @@ def project_state(physics, modes, x, reference):  # type: ignore[no-untyped-def]
 def _length_changes(physics, n, i, x, R, longer, faster):  # type: ignore[no-untyped-def]
     """longer, faster (12,): derivatives of cable i's l and dl/dt where the local state has no rotation.
 
-    In the pose (position, right-hand rotation increment), the ceiling's point and the body's. With u along
-    the cable, D its line to the ceiling and s the body hinge's velocity, dl = u . dD and
-    d(dl/dt) = -(du . s + u . ds), du = (dD - u (u . dD))/l.
+    In the pose (position, right-hand rotation increment), the ceiling's point and the body's.
     """
-    o = CABLES + CABLE_SIZE * i
-    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
-    wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
-    vx, vy, vz = in_body(R, x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2)
-    bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-    fx, fy, fz = in_body(
-        R,
-        physics[o + CEILING_POINT] + s0 - x[0],
-        physics[o + CEILING_POINT + 1] + s1 - x[1],
-        physics[o + CEILING_POINT + 2] + s2 - x[2],
-    )
-    ux, uy, uz = fx - bx, fy - by, fz - bz
-    k = 1.0 / math.sqrt(ux * ux + uy * uy + uz * uz)
-    ux, uy, uz = ux * k, uy * k, uz * k
-    ex, ey, ez = cross(wx, wy, wz, bx, by, bz)
-    sx, sy, sz = vx + ex, vy + ey, vz + ez
-    along = ux * sx + uy * sy + uz * sz
+    u, (fx, fy, fz), (vx, vy, vz), _, s, length = cable_line(physics, n, i, x, R)
     for c in range(12):
         a = c % 3
-        hx, hy, hz = 1.0 * (a == 0), 1.0 * (a == 1), 1.0 * (a == 2)
-        px, py, pz = 0.0, 0.0, 0.0
         if c < 3:
-            dx, dy, dz = -R[a, 0], -R[a, 1], -R[a, 2]
+            line, speed = (-R[a, 0], -R[a, 1], -R[a, 2]), (0.0, 0.0, 0.0)
         elif c < 6:
             # A vector of the world in body axes turns by v x theta
-            dx, dy, dz = cross(fx, fy, fz, hx, hy, hz)
-            px, py, pz = cross(vx, vy, vz, hx, hy, hz)
-        elif c < 9:
-            dx, dy, dz = R[a, 0], R[a, 1], R[a, 2]
+            hx, hy, hz = 1.0 * (a == 0), 1.0 * (a == 1), 1.0 * (a == 2)
+            line, speed = cross(fx, fy, fz, hx, hy, hz), cross(vx, vy, vz, hx, hy, hz)
         else:
-            dx, dy, dz = -hx, -hy, -hz
-            px, py, pz = cross(wx, wy, wz, hx, hy, hz)
-        change = ux * dx + uy * dy + uz * dz
-        longer[c] = change
-        faster[c] = -(k * (dx * sx + dy * sy + dz * sz - change * along) + ux * px + uy * py + uz * pz)
+            _, line, speed = hinge_change(x, R, c - 6)
+        longer[c], _, along = line_change(u, s, length, line, speed)
+        faster[c] = -along
 
 
 @njit(cache=True)

@@ -105,13 +105,14 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
     Rc = np.empty((3, 3), dtype=np.complex128)
     Kc = np.empty((size, size), dtype=np.complex128)
     rc = np.empty(size, dtype=np.complex128)
-    own, change = np.empty((9, size)), np.empty(size)
+    own = np.empty((9, size))
     block = CABLES + CABLE_SIZE * n
     weighty = physics.shape[0] > block and physics[block + LINEAR_DENSITY] != 0.0
     internal = (states - BODY_STATE) // 2
     air, heavy, rotor, hinged = effects_reach(physics, modes, internal)
     acting = internal > 0 or effects_act(physics, modes)
     defect = np.zeros((size, states + directions.shape[0]))
+    weight = np.zeros((n, states + directions.shape[0]))  # of the cables themselves, at their cells
     rotation(reference, x, R)
     body_and_cable_columns(physics, modes, x, R, z, defect[:, :states])
     if acting:
@@ -122,12 +123,16 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
             rc[:] = 0.0
             add_effects(pc, modes, xc, Rc, Kc, rc)
             _add_defect(Kc, rc, z, defect[:, column])
+            if weighty:
+                for i in range(n):
+                    weight[i, column] = weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
             xc[column] = x[column]
     rotation(reference, xc, Rc)
     known = -1
     for column in range(directions.shape[0]):
         d = directions[column]
-        change[:] = 0.0
+        change = defect[:, states + column]
+        reached = True
         if d == EXCITER_CLOCK or EXCITER_POSITION <= d < CABLES:
             add_exciter_number(physics, mount, d, force, force_rate, change)
             reached = rotor and d != EXCITER_CLOCK
@@ -143,25 +148,21 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
             if number < own.shape[0]:
                 change[:] = own[number]
             reached = hinged
-        else:
+        if not reached:
+            continue
+        pc[d] = complex(physics[d], STEP)
+        Kc[:, :] = 0.0
+        rc[:] = 0.0
+        if d >= block:
             # A ceiling's numbers and the softness of redundant cables stand in all cables' rows
-            pc[d] = complex(physics[d], STEP)
-            Kc[:, :] = 0.0
-            rc[:] = 0.0
             for i in range(n):
                 add_cable(pc, i, modes, xc, Rc, Kc, rc)
-            _add_defect(Kc, rc, z, change)
-            reached = True
-        if reached:
-            pc[d] = complex(physics[d], STEP)
-            Kc[:, :] = 0.0
-            rc[:] = 0.0
-            add_effects(pc, modes, xc, Rc, Kc, rc)
-            _add_defect(Kc, rc, z, change)
-        if d >= 0:
-            pc[d] = physics[d]
-        for i in range(size):
-            defect[i, states + column] = change[i]
+        add_effects(pc, modes, xc, Rc, Kc, rc)
+        _add_defect(Kc, rc, z, change)
+        if weighty or d == block + LINEAR_DENSITY:
+            for i in range(n):
+                weight[i, states + column] = weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
+        pc[d] = physics[d]
     out[:, :] = 0.0
     for i in range(size):
         for j in range(size):
@@ -173,23 +174,9 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
                     out[i, c + WRENCH] += g * defect[j, c]
         for j in range(WRENCH):
             out[i, states + j] = inverse[i, j]
-    for column in range(states + directions.shape[0]):
-        heavier = column >= states and directions[column - states] == block + LINEAR_DENSITY
-        if not weighty and not heavier:
-            continue
-        target = column if column < states else column + WRENCH
-        if column < states:
-            xc[column] = complex(x[column], STEP)
-            rotation(reference, xc, Rc)
-        elif directions[column - states] >= 0:
-            rotation(reference, xc, Rc)
-            pc[directions[column - states]] = complex(physics[directions[column - states]], STEP)
-        for i in range(n):
-            out[6 + i, target] += weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
-        if column < states:
-            xc[column] = x[column]
-        elif directions[column - states] >= 0:
-            pc[directions[column - states]] = physics[directions[column - states]]
+    for i in range(n):
+        for c in range(weight.shape[1]):
+            out[6 + i, c if c < states else c + WRENCH] += weight[i, c]
 
 
 @njit(cache=True, nogil=True)

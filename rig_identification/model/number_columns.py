@@ -15,11 +15,9 @@ times faster. With the unknowns z = (A, alpha, T) of dynamics.py held and a = R^
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
-from rig_identification.model.effects.internal import ceiling_shift
+from rig_identification.model.cable_line import cable_line, cross, hinge_change, in_body, line_change
 from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
@@ -30,7 +28,6 @@ from rig_identification.model.layout import (
     CABLE_SIZE,
     CABLES,
     CEILING,
-    CEILING_POINT,
     COMPLIANCE,
     ELASTIC,
     EXCITER_GAIN,
@@ -44,9 +41,7 @@ from rig_identification.model.layout import (
     RATE,
     RIGID,
     SLACK,
-    VELOCITY,
 )
-from rig_identification.model.state_columns import cross, in_body
 
 
 @njit(cache=True)
@@ -157,21 +152,11 @@ def cable_number_columns(physics, modes, i, x, R, z, change):  # type: ignore[no
     if modes[i] == SLACK:
         return
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
-    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
-    vx, vy, vz = in_body(R, x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2)
+    u, _, _, (ex, ey, ez), s, length = cable_line(physics, n, i, x, R)
+    ux, uy, uz = u
+    sx, sy, sz = s
     bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-    fx, fy, fz = in_body(
-        R,
-        physics[o + CEILING_POINT] + s0 - x[0],
-        physics[o + CEILING_POINT + 1] + s1 - x[1],
-        physics[o + CEILING_POINT + 2] + s2 - x[2],
-    )
-    ux, uy, uz = fx - bx, fy - by, fz - bz
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
     per_length = 1.0 / length
-    ux, uy, uz = ux * per_length, uy * per_length, uz * per_length
-    ex, ey, ez = cross(wx, wy, wz, bx, by, bz)
-    sx, sy, sz = vx + ex, vy + ey, vz + ez
     along = ux * sx + uy * sy + uz * sz
     across = (sx * sx + sy * sy + sz * sz - along * along) * per_length
     cx, cy, cz = cross(wx, wy, wz, ex, ey, ez)
@@ -186,22 +171,9 @@ def cable_number_columns(physics, modes, i, x, R, z, change):  # type: ignore[no
         change[AXIAL_STIFFNESS, row] = stretch / unloaded
         change[AXIAL_DAMPING, row] = -stiffness * along
     for number in range(6):
-        k = number % 3
-        # What the change does to the line to the ceiling, to the body's hinge, and to its velocity
-        hx, hy, hz, px, py, pz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        if number < BODY_POINT:
-            dx, dy, dz = R[k, 0], R[k, 1], R[k, 2]
-        else:
-            hx, hy, hz = 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)
-            dx, dy, dz = -hx, -hy, -hz
-            px, py, pz = cross(wx, wy, wz, hx, hy, hz)
-        longer = ux * dx + uy * dy + uz * dz
-        tx, ty, tz = (
-            (dx - ux * longer) * per_length,
-            (dy - uy * longer) * per_length,
-            (dz - uz * longer) * per_length,
-        )
-        faster = tx * sx + ty * sy + tz * sz + ux * px + uy * py + uz * pz
+        (hx, hy, hz), line, speed = hinge_change(x, R, number)
+        px, py, pz = speed
+        longer, (tx, ty, tz), faster = line_change(u, s, length, line, speed)
         mx, my, mz = cross(bx, by, bz, tx, ty, tz)
         ax, ay, az = cross(hx, hy, hz, ux, uy, uz)
         mx, my, mz = mx + ax, my + ay, mz + az

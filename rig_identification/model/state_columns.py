@@ -16,12 +16,10 @@ the line from the body's hinge to the ceiling's.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
-from rig_identification.model.effects.internal import ceiling_shift
+from rig_identification.model.cable_line import cable_line, cross, in_body, line_change
 from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
@@ -32,7 +30,6 @@ from rig_identification.model.layout import (
     CABLE_SIZE,
     CABLES,
     CEILING,
-    CEILING_POINT,
     COMPLIANCE,
     ELASTIC,
     GRAVITY,
@@ -46,22 +43,6 @@ from rig_identification.model.layout import (
     SLACK,
     VELOCITY,
 )
-
-
-@njit(cache=True, inline="always")
-def cross(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
-    """a x b."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-
-
-@njit(cache=True, inline="always")
-def in_body(R, a, b, c):  # type: ignore[no-untyped-def]
-    """R^T (a, b, c): a world vector in body axes."""
-    return (
-        R[0, 0] * a + R[1, 0] * b + R[2, 0] * c,
-        R[0, 1] * a + R[1, 1] * b + R[2, 1] * c,
-        R[0, 2] * a + R[1, 2] * b + R[2, 2] * c,
-    )
 
 
 @njit(cache=True)
@@ -127,22 +108,11 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
     o = CABLES + CABLE_SIZE * i
     row = 6 + i
     wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
-    # A yielding ceiling moves the upper hinges
-    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
-    v0, v1, v2 = x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2
-    vx, vy, vz = in_body(R, v0, v1, v2)
+    u, (fx, fy, fz), (vx, vy, vz), (ex, ey, ez), s, length = cable_line(physics, n, i, x, R)
+    ux, uy, uz = u
+    sx, sy, sz = s
     bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
-    d0 = physics[o + CEILING_POINT] + s0 - x[0]
-    d1 = physics[o + CEILING_POINT + 1] + s1 - x[1]
-    d2 = physics[o + CEILING_POINT + 2] + s2 - x[2]
-    # From the datum to the ceiling's hinge, and from the body's
-    fx, fy, fz = in_body(R, d0, d1, d2)
-    ux, uy, uz = fx - bx, fy - by, fz - bz
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
     per_length = 1.0 / length
-    ux, uy, uz = ux * per_length, uy * per_length, uz * per_length
-    ex, ey, ez = cross(wx, wy, wz, bx, by, bz)
-    sx, sy, sz = vx + ex, vy + ey, vz + ez
     along = ux * sx + uy * sy + uz * sz
     across = (sx * sx + sy * sy + sz * sz - along * along) * per_length
     cx, cy, cz = cross(wx, wy, wz, ex, ey, ez)
@@ -178,13 +148,7 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
         else:
             qx, qy, qz = 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2)
             px, py, pz = cross(qx, qy, qz, bx, by, bz)
-        longer = ux * dx + uy * dy + uz * dz
-        tx, ty, tz = (
-            (dx - ux * longer) * per_length,
-            (dy - uy * longer) * per_length,
-            (dz - uz * longer) * per_length,
-        )
-        faster = tx * sx + ty * sy + tz * sz + ux * px + uy * py + uz * pz
+        longer, (tx, ty, tz), faster = line_change(u, s, length, (dx, dy, dz), (px, py, pz))
         placed = column < VELOCITY or BODY_STATE <= column < BODY_STATE + internal
         if placed:
             mx, my, mz = cross(bx, by, bz, tx, ty, tz)
