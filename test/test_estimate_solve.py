@@ -17,10 +17,10 @@ from rig_identification.estimate.solve import (
     Evaluation,
     Point,
     Problem,
-    _along_valley,
     _bounded_step,
     _in_box,
     _moved,
+    _pulled_back,
     evaluate,
 )
 
@@ -92,22 +92,27 @@ def test_no_fit_ends_on_residuals_without_derivatives(
     assert np.any(found.runs[0].jacobian[:, :p])
 
 
-def test_a_bent_step_follows_the_valley(fit: tuple[Problem, Point]) -> None:
-    """Where residuals are curved along a step, one that knows its second order wins more."""
+def test_a_step_is_pulled_back_into_the_valley(fit: tuple[Problem, Point]) -> None:
+    """Where residuals are curved along a step, one that takes their second order back keeps its promise."""
     problem, point = fit
     problem = replace(problem, bound=np.inf, stride=np.inf)
     current = evaluate(problem, point)
     assert current is not None
-    straight = _bounded_step(problem, current, 0.0)
-    bent = _along_valley(problem, current, 0.0, straight)
-    assert np.any(bent != straight)
 
-    def cost(change: np.ndarray) -> float:
+    def at(change: np.ndarray) -> Evaluation:
         there = evaluate(problem, _moved(problem, current, change), residuals_only=True)
         assert there is not None
-        return there.cost
+        return there
 
-    assert cost(bent) < cost(straight) < current.cost
+    straight = _bounded_step(problem, current, 0.0)
+    promised = fitting._promised(current, straight)
+    back = at(_pulled_back(problem, current, 0.0, straight, at(straight)))
+    assert abs(current.cost - back.cost - promised) < 0.1 * abs(current.cost - at(straight).cost - promised)
+    # Where nothing is curved nothing is to be taken back
+    tiny = _bounded_step(problem, current, 1e6)
+    again = _pulled_back(problem, current, 1e6, tiny, at(tiny))
+    scale = np.sqrt(np.diag(current.information))
+    assert np.linalg.norm(scale * (again - tiny)) < 1e-3 * np.linalg.norm(scale * tiny)
 
 
 def test_a_quadratic_in_a_box_is_minimised() -> None:

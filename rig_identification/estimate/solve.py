@@ -279,35 +279,27 @@ def _in_box(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     return np.asarray(np.clip(lsq_linear(root.T, target, (low, high), method="bvls").x, low, high))
 
 
-#: Part of a step before and after which its curvature is looked at, and length of what curvature adds, in
-#: parts of the step, beyond which it is not to be trusted.
-AHEAD, TOO_BENT = 0.2, 0.75
+def _pulled_back(
+    problem: Problem, current: Evaluation, damping: float, change: Array, there: Evaluation
+) -> Array:
+    """The step ``change``, which led to ``there``, with what is of second order in it taken back.
 
-
-def _along_valley(problem: Problem, current: Evaluation, damping: float, change: Array) -> Array:
-    """The step ``change`` bent to second order along the valley that it starts in.
-
-    The second derivative of all residuals along a step, by two more evaluations without derivatives, says
-    where the floor of a curved valley goes ("geodesic acceleration": Transtrum and Sethna, "Improvements to
-    the Levenberg-Marquardt algorithm for nonlinear least-squares minimization", 2012, arXiv:1201.5885).
-    From both sides, because the whitening's own first derivative is not in the Jacobian.
+    Where measurements hold a combination of unknowns far tighter than each one of them, as four taut cables'
+    tensions hold a rig's geometry, a long step leaves the narrow curved valley that they make and costs a
+    thousand times what it wins. With how far all residuals ``there`` are from what first order told of them,
+    and the derivatives of where the step began, it is solved for again: a "second-order correction" (Nocedal
+    and Wright, "Numerical Optimization", 2006, section 15.6). It takes residuals alone, and no differences.
     """
-    before, after = (
-        evaluate(problem, _moved(problem, current, s * AHEAD * change), residuals_only=True) for s in (-1, 1)
+    told = current.gradient - current.information @ change
+    runs = zip(there.runs, current.runs, strict=True)
+    rests = zip(there.rests, current.rests, strict=True)
+    found = _assemble(
+        problem,
+        there.point,
+        tuple(replace(run, jacobian=here.jacobian) for run, here in runs),
+        tuple(replace(rest, jacobian=here.jacobian) for rest, here in rests),
     )
-    if before is None or after is None:
-        return change
-    p = start = problem.bench.parameters.size
-    bend = np.zeros(change.size)
-    for here, one, other in zip(current.runs, before.runs, after.runs, strict=True):
-        end = start + here.jacobian.shape[1] - p
-        columns = np.concatenate([np.arange(p), np.arange(start, end)])
-        bend[columns] += here.jacobian.T @ (0.5 * (one.residual + other.residual) - here.residual) / AHEAD**2
-        start = end
-    bent = _bounded_step(problem, current, damping, bend)
-    weight = np.diag(current.information)
-    far = np.sqrt(float(weight @ (bent - change) ** 2) / max(float(weight @ change**2), 1e-300))
-    return bent if 2.0 * far < TOO_BENT else change
+    return _bounded_step(problem, current, damping, found.gradient - told)
 
 
 #: No positive number leaves so many std of its logarithm's prior.
@@ -326,7 +318,8 @@ HOPELESS = 100.0
 #: Share of what noise does not account for below which a step's gain is not worth taking: a model
 #: that lacks something has no optimum worth polishing.
 POLISH = 3e-3
-#: Factors on the damping after a step that paid and after one that did not.
+#: Factors on the damping after a step that paid and after one that did not; the latter twice as large after
+#: each further one (Nielsen, "Damping parameter in Marquardt's method", 1999).
 EASED, BRAKED = 0.2, 5.0
 #: Evaluations that a fit may take for each of its steps on average, and what one without derivatives costs.
 PATIENCE, QUICK = 3.0, 0.3
@@ -404,7 +397,6 @@ def solve(
     tolerance: float = 1e-3,
     polish: float = 0.0,
     patience: float = PATIENCE,
-    bends: bool = False,
     notify: Callable[[int, float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> tuple[Evaluation, bool]:
@@ -414,7 +406,7 @@ def solve(
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
     a step won less than ``polish`` of what stays unexplained, the fit ends there as well: a
     hypothesis that leaves much is not worth following down every valley. After a step that did not pay the
-    next ones are tried without derivatives first, and where ``bends`` bent along their valley. Steps that
+    next ones are tried without derivatives first. Steps that
     win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count. Where ``stop`` says so the fit
@@ -427,7 +419,7 @@ def solve(
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
     damping, failed, creeping, idle, spent, against = damped.value, 0.0, 0, 0, 0.0, 0
     for iteration in range(iterations):
-        turned_back = False
+        turned_back, brake = False, BRAKED
         while True:
             damped.value = damping
             if spent > patience * iterations:
@@ -442,9 +434,6 @@ def solve(
             if damping > 1e-3 and gain < polish * excess(current):
                 # Held back so much, no step can win what would be worth it
                 return current, False
-            if wary and bends:
-                change = _along_valley(problem, current, damping, change)
-                spent += 2.0 * QUICK
             moved, allowed = _moved(problem, current, change), current.cost + ROUNDING * abs(current.cost)
             if damping <= 1e-3 and gain < AT_ROOT and against < LEAPS:
                 allowed += gain
@@ -453,6 +442,14 @@ def solve(
             if not wary or (trial is not None and trial.cost < allowed):
                 trial = evaluate(problem, moved)
                 spent += 1.0
+            if trial is not None and trial.cost >= allowed:
+                change = _pulled_back(problem, current, damping, change, trial)
+                moved = _moved(problem, current, change)
+                trial = evaluate(problem, moved, residuals_only=True)
+                spent += QUICK
+                if trial is not None and trial.cost < allowed:
+                    trial = evaluate(problem, moved)
+                    spent += 1.0
             if trial is not None and trial.cost < allowed:
                 if damping <= failed:
                     failed = 0.0
@@ -469,7 +466,7 @@ def solve(
             if gain < CLOSE and damping <= 1e-3 and still_promised(problem, current) < CLOSE:
                 return current, not on_plateau(current)
             failed, turned_back = max(failed, damping), True
-            damping = max(damping, 1e-6) * BRAKED
+            damping, brake = max(damping, 1e-6) * brake, 2.0 * brake
             if damping > 1e6:
                 return current, _as_good_as_settled(problem, current)
             if stop is not None and stop():

@@ -44,11 +44,8 @@ def fit_whole(
         begun.get(run.begins) or launch_state(whole.bench, run, point.theta, rest) for run in whole.runs
     )
     begin = Point(point.theta, starts, point.rest_guesses)
-    bends = whole.bench.parameters.model.internal > 0
     found = _about_what_happened(whole, begin, stop) if curved else None
-    evaluation, converged = found or solve(
-        whole, begin, iterations=STEPS, polish=POLISH, bends=bends, stop=stop
-    )
+    evaluation, converged = found or solve(whole, begin, iterations=STEPS, polish=POLISH, stop=stop)
     known = (*ideal.holdout_runs, *ideal.lost)
     held_runs, held, lost = predicted(whole, known, evaluation.point.theta, rest)
     return replace(
@@ -71,7 +68,7 @@ def _about_what_happened(
         there = followed(whole, point)
         if there is None:
             break
-        found = solve(whole, there, iterations=STEPS, bends=True, stop=stop)
+        found = solve(whole, there, iterations=STEPS, stop=stop)
         point = found[0].point
         if found[1] or (stop is not None and stop()):
             break

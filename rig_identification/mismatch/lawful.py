@@ -187,9 +187,7 @@ def _grown(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple[
 
 
 def _solved(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple[Evaluation, bool]:
-    return solve(
-        problem, point, iterations=steps, tolerance=0.1, polish=POLISH, bends=True, stop=budget.spent
-    )
+    return solve(problem, point, iterations=steps, tolerance=0.1, polish=POLISH, stop=budget.spent)
 
 
 def _sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:

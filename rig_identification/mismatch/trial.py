@@ -229,7 +229,7 @@ def _placed(begun: Point, promised: Point, problem: Problem, candidate: Candidat
 
 
 def _first_steps(problem: Problem, point: Point, steps: int, stop: Stop) -> tuple[Evaluation, bool]:
-    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, bends=True, stop=stop)
+    return solve(problem, point, iterations=steps, tolerance=0.5, polish=POLISH, stop=stop)
 
 
 def _from_promise(
@@ -296,9 +296,7 @@ def _grown(
         point = replace(point, starts=settled_starts(part, point))
         if end == HORIZONS[0]:
             point = _with_amount(part, candidate, point)
-        fitted, _ = solve(
-            part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, bends=True, stop=stop
-        )
+        fitted, _ = solve(part, point, iterations=CHANGED_STEPS, tolerance=0.5, polish=POLISH, stop=stop)
         point, left = fitted.point, misfit(fitted)
     return replace(point, starts=settled_starts(problem, point)), left
 
@@ -347,7 +345,6 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
             iterations=LAST_STEPS,
             tolerance=0.05,
             polish=POLISH,
-            bends=True,
             stop=stop,
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)

@@ -53,7 +53,7 @@ def _by_itself(origin: Search, trial: Trial) -> Trial | None:
     problem = extended(pieces, (trial.candidate,))
     point = carried(problem, trial.problem, trial.evaluation.point)
     try:
-        fitted, _ = solve(problem, point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH, bends=True)
+        fitted, _ = solve(problem, point, iterations=LAST_STEPS, tolerance=0.05, polish=POLISH)
     except FloatingPointError:
         return None
     single = Trial(trial.candidate, problem, fitted, log_evidence(fitted), settled=True)
