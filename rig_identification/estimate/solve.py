@@ -279,6 +279,11 @@ def _in_box(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     return np.asarray(np.clip(lsq_linear(root.T, target, (low, high), method="bvls").x, low, high))
 
 
+#: Share of what a step promises that it keeps at least once it is pulled back: where it does not it is too
+#: long for a second order as well, and a damped one leads less astray.
+KEPT = 0.5
+
+
 def _pulled_back(
     problem: Problem, current: Evaluation, damping: float, change: Array, there: Evaluation
 ) -> Array:
@@ -318,8 +323,7 @@ HOPELESS = 100.0
 #: Share of what noise does not account for below which a step's gain is not worth taking: a model
 #: that lacks something has no optimum worth polishing.
 POLISH = 3e-3
-#: Factors on the damping after a step that paid and after one that did not; the latter twice as large after
-#: each further one (Nielsen, "Damping parameter in Marquardt's method", 1999).
+#: Factors on the damping after a step that paid and after one that did not.
 EASED, BRAKED = 0.2, 5.0
 #: Evaluations that a fit may take for each of its steps on average, and what one without derivatives costs.
 PATIENCE, QUICK = 3.0, 0.3
@@ -419,7 +423,7 @@ def solve(
         raise FloatingPointError("the forward model cannot be evaluated at the first guess")
     damping, failed, creeping, idle, spent, against = damped.value, 0.0, 0, 0, 0.0, 0
     for iteration in range(iterations):
-        turned_back, brake = False, BRAKED
+        turned_back = False
         while True:
             damped.value = damping
             if spent > patience * iterations:
@@ -447,9 +451,11 @@ def solve(
                 moved = _moved(problem, current, change)
                 trial = evaluate(problem, moved, residuals_only=True)
                 spent += QUICK
-                if trial is not None and trial.cost < allowed:
+                if trial is not None and current.cost - trial.cost > KEPT * gain:
                     trial = evaluate(problem, moved)
                     spent += 1.0
+                else:
+                    trial = None
             if trial is not None and trial.cost < allowed:
                 if damping <= failed:
                     failed = 0.0
@@ -466,7 +472,7 @@ def solve(
             if gain < CLOSE and damping <= 1e-3 and still_promised(problem, current) < CLOSE:
                 return current, not on_plateau(current)
             failed, turned_back = max(failed, damping), True
-            damping, brake = max(damping, 1e-6) * brake, 2.0 * brake
+            damping = max(damping, 1e-6) * BRAKED
             if damping > 1e6:
                 return current, _as_good_as_settled(problem, current)
             if stop is not None and stop():
