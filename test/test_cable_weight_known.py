@@ -81,6 +81,7 @@ def test_what_is_known_is_not_stated_any_more() -> None:
     assert np.max(np.sqrt(np.diag(unknown.total.covariance)) / std) > 1.2
 
 
+@pytest.mark.long
 def test_chains_that_carry_a_light_body_are_weighed() -> None:
     """What cables may weigh is no share of what hangs from them."""
     chain = 3.0

@@ -215,6 +215,7 @@ def in_the_air() -> Identification:
     return watched(runs, 5, effects)
 
 
+@pytest.mark.long
 def test_air_and_a_softening_turn_are_told_apart_by_how_they_die(in_the_air: Identification) -> None:
     """To first order in the turn they look like other dampers, and another inertia."""
     sides = next(f for f in in_the_air.mismatch.findings if f.effect == "air_drag")

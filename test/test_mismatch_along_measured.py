@@ -158,6 +158,7 @@ def _lagging(recording: Recording, lag: float) -> Recording:
     return replace(recording, tension={**recording.tension, name: replace(tension, values=late)})
 
 
+@pytest.mark.long
 def test_a_cell_that_lags_is_told_from_forces() -> None:
     made, _ = simulate_session(shaken(10, 12.0), np.random.default_rng(4))
     session = replace(made, recordings=tuple(_lagging(r, 0.05) for r in made.recordings))
@@ -166,6 +167,7 @@ def test_a_cell_that_lags_is_told_from_forces() -> None:
     assert first.candidate.label in (f"sensor_lag {cell}", f"clock_offset {cell}")
 
 
+@pytest.mark.long
 def test_what_devices_contradict_leads_to_what_acts_on_the_body() -> None:
     said: list[str] = []
     found = identify(_off(0.012, {"hinge_friction": (4.0,)}), lambda stage, share: said.append(stage))

@@ -61,6 +61,7 @@ def _promised(problem: Problem, evaluation: Evaluation, frequency: float) -> Pro
     return Promise(candidate, 100.0, values, 0.9)
 
 
+@pytest.mark.long
 def test_the_start_that_comes_to_less_stays(swinging: tuple[Problem, Evaluation]) -> None:
     problem, evaluation = swinging
     wrong, right = (_promised(problem, evaluation, f) for f in (3.0 * RATE, RATE))
@@ -86,6 +87,7 @@ def test_a_ceiling_is_promised_at_another_frequency_too() -> None:
     assert len(ceiling.elsewhere) <= 1
 
 
+@pytest.mark.long
 def test_liquid_is_found_beside_cables_that_stretch() -> None:
     """Both change the model: each alone leaves far more than noise."""
     effects = {

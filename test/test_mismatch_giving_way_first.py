@@ -69,6 +69,7 @@ def test_a_ceiling_that_yields_leads_to_an_imu_off_its_place() -> None:
     assert "from where nothing is bent" not in stages
 
 
+@pytest.mark.long
 def test_what_gives_way_is_seen_once_a_clock_is_right() -> None:
     effects = {"ceiling_compliance.stiffness": (0.0, 0.0, FIRM), "ceiling_compliance.mass": (HEAVIER,)}
     stages: list[str] = []

@@ -92,6 +92,7 @@ def test_a_lag_that_follows_the_body_better_stays_first() -> None:
     assert first.evidence - second.evidence == 40.0
 
 
+@pytest.mark.long
 def test_a_lag_is_told_before_the_clock_that_is_alike_to_it() -> None:
     """The clock leaves next to nothing, and keeps the lag from being tried unless it is asked for."""
     made, _ = simulate_session(shaken(14, 12.0), np.random.default_rng(8))

@@ -55,6 +55,7 @@ def test_a_brake_is_no_liquid_that_bends_to_it(braked: tuple[Ideal, Search]) -> 
     assert len(found.bodies) == 1
 
 
+@pytest.mark.long
 def test_no_law_goes_before_what_is_there() -> None:
     ideal, search = searched({"hinge_damping": (3.0,)})
     trial, damping = told(ideal, search, "hinge_damping")

@@ -46,6 +46,7 @@ def test_air_beside_a_turned_inclinometer_is_told(both: tuple[Identification, np
     assert np.max(np.abs(deviation)) < 3.5
 
 
+@pytest.mark.long
 def test_where_there_is_no_air_none_is_told_and_the_interval_has_cables_in_it() -> None:
     found, deviation = _answer(0.0)
     assert {f.effect for f in found.mismatch.findings} == {"inclinometer_offset"}

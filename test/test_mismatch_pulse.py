@@ -45,6 +45,7 @@ def test_a_gentle_push_is_found_in_a_fitted_run_and_in_one_held_out(pushed: str)
     assert found.holdout_error < 1.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("pushed", "bias", "push"),
     [

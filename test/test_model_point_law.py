@@ -111,10 +111,14 @@ def test_derivatives_of_a_law() -> None:
 @pytest.mark.parametrize(
     ("effects", "part"),
     [
-        ({"point_law.spring": (0.0, 0.0, 1.5e7), "point_law.line": (1.2, 0.0)}, "cubic_stiffness"),
-        ({"point_law.brake": (0.0, 900.0)}, "quadratic_damping"),
+        pytest.param(
+            {"point_law.spring": (0.0, 0.0, 1.5e7), "point_law.line": (1.2, 0.0)},
+            "cubic_stiffness",
+            id="cubic_spring",
+            marks=pytest.mark.long,
+        ),
+        pytest.param({"point_law.brake": (0.0, 900.0)}, "quadratic_damping", id="square_brake"),
     ],
-    ids=["cubic_spring", "square_brake"],
 )
 def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float, ...]], part: str) -> None:
     """Of a spring's three parts and a brake's two, and its fading, the one that is there stays."""

@@ -107,7 +107,7 @@ def test_a_signal_while_recording_leaves_the_recording_whole(
     assert quality["/rig/cable_1/wrench"].missing == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_signal_while_data_flows_ends_every_node_and_keeps_the_open_window(
     graph: Graph, probe: Probe, number: int
 ) -> None:
@@ -135,7 +135,7 @@ def test_a_signal_while_data_flows_ends_every_node_and_keeps_the_open_window(
         assert run.imu is not None
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_signal_while_replaying_ends_the_replay(graph: Graph, probe: Probe, number: int) -> None:
     folder = graph.folder / "session"
     processes = simulated(graph)
@@ -160,7 +160,7 @@ def keep_a_window(probe: Probe, diagnostics: Diagnostics, seconds: float = 1.0) 
     assert probe.call("identifier/stop_window").success
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM])
 def test_a_signal_while_fitting_ends_fit_and_node(graph: Graph, probe: Probe, number: int) -> None:
     simulated(graph)
     identifier = graph.start("identifier", "recording.kind:=static")

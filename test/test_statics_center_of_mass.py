@@ -268,7 +268,7 @@ def drawn(rig, rng):
     return replace(rig, cables=tuple(cables), inclinometer=mounted)
 
 
-@pytest.mark.parametrize("cells", [False, True])
+@pytest.mark.parametrize("cells", [pytest.param(False, marks=pytest.mark.long), True])
 def test_standard_deviations_hold_over_drawn_rigs(cells):
     """Hinges, lengths, level, inclinometer, scale and cells drawn: (c - truth) / std is N(0, 1)."""
     case = load_case(14)
