@@ -70,6 +70,12 @@ def test_residuals_without_derivatives_are_the_same(fit: tuple[Problem, Point]) 
     assert quick.cost == pytest.approx(whole.cost, rel=1e-12)
 
 
+def test_a_start_that_is_no_number_cannot_be_evaluated(fit: tuple[Problem, Point]) -> None:
+    problem, point = fit
+    lost = replace(point.starts[0], velocity=np.full(3, np.nan))
+    assert evaluate(problem, replace(point, starts=(lost,)), residuals_only=True) is None
+
+
 def test_no_fit_ends_on_residuals_without_derivatives(
     fit: tuple[Problem, Point], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -111,6 +111,9 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
     residuals_only: residuals and cost hold, what else is derived from derivatives does not; it takes a
     quarter of the time.
     """
+    if not (np.all(np.isfinite(point.theta)) and all(start.is_finite for start in point.starts)):
+        # A step so long that no number holds it, or its start cannot be put back onto the cables
+        return None
     bench = problem.bench
     latents = point.latents or (None,) * len(problem.runs)
 

@@ -154,6 +154,12 @@ class State:
             inner = np.zeros(size - layout.BODY_STATE)
         return np.concatenate([self.position, np.zeros(3), self.velocity, self.rate, inner])
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether every number of it is one."""
+        parts = (self.position, self.R_world_body, self.velocity, self.rate, self.internal)
+        return all(bool(np.all(np.isfinite(part))) for part in parts)
+
     def moved(self, increment: Array) -> State:
         """State displaced by (12 + 2 s,): position (world), rotation (body, right), velocity, rate, q, q'."""
         return State(
