@@ -27,7 +27,12 @@ from rig_identification.model.dynamics import (
     rotation,
     rotation_rate,
 )
-from rig_identification.model.effects.all import add_effects, effects_act, effects_reach
+from rig_identification.model.effects.all import (
+    add_effects,
+    effects_act,
+    effects_follow,
+    effects_reach,
+)
 from rig_identification.model.effects.cable_mass import weight_below_cell
 from rig_identification.model.effects.internal import ceiling_shift
 from rig_identification.model.effects.place import LINEAR_DENSITY
@@ -111,12 +116,15 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
     internal = (states - BODY_STATE) // 2
     air, heavy, rotor, hinged = effects_reach(physics, modes, internal)
     acting = internal > 0 or effects_act(physics, modes)
+    following = effects_follow(physics, modes)
     defect = np.zeros((size, states + directions.shape[0]))
     weight = np.zeros((n, states + directions.shape[0]))  # of the cables themselves, at their cells
     rotation(reference, x, R)
     body_and_cable_columns(physics, modes, x, R, z, defect[:, :states])
     if acting:
         for column in range(states):
+            if not following and (column < ROTATION or VELOCITY <= column < RATE):
+                continue
             xc[column] = complex(x[column], STEP)
             rotation(reference, xc, Rc)
             Kc[:, :] = 0.0

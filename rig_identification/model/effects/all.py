@@ -29,6 +29,7 @@ from rig_identification.model.effects.place import (
     ROTOR_MASS,
     TETHER_POINT,
     TORSION,
+    TURNING_CUBE,
     active,
 )
 from rig_identification.model.effects.point_law import add_point_law
@@ -63,6 +64,22 @@ def effects_act(physics, modes):  # type: ignore[no-untyped-def]
     for i in range(TETHER_POINT):
         acting = acting or active(physics[block + i])
     return acting
+
+
+@njit(cache=True)
+def effects_follow(physics, modes):  # type: ignore[no-untyped-def]
+    """Whether any effect answers to where the body is or how fast it goes, beside how it is turned and turns.
+
+    What rides on the body or turns with it does not; hinges, air, cables' own mass and what it is tied to do.
+    """
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    if physics.shape[0] <= block:
+        return False
+    following = False
+    for i in range(TETHER_POINT):
+        rides = i in (ADDED_MASS, ROTOR_MASS, GYROSCOPIC_SHARE, TURNING_CUBE)
+        following = following or (not rides and active(physics[block + i]))
+    return following
 
 
 @njit(cache=True)
