@@ -412,9 +412,9 @@ def solve(
     Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
     a step won less than ``polish`` of what stays unexplained, the fit ends there as well: a
-    hypothesis that leaves much is not worth following down every valley. After a step that did not pay the
-    next ones are tried without derivatives first. Steps that
-    win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
+    hypothesis that leaves much is not worth following down every valley. A step that does not pay is pulled
+    back into its valley before it is damped, and the next ones are tried without derivatives first. Steps
+    that win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
     A plateau, where nothing fits and nothing answers any more, does not count. Where ``stop`` says so the fit
     ends after the step that it tries, unconverged. patience: evaluations that a step may take on average.
