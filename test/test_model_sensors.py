@@ -157,4 +157,4 @@ def test_drift(settling: float) -> None:
     moved = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(fine))])
     np.testing.assert_allclose(values[:, 0], np.interp(time, fine, moved), rtol=1e-6, atol=1e-9)
     numeric = slope(lambda d: sensors.drift(time, d)[0], device)
-    np.testing.assert_allclose(derivatives, numeric, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(derivatives(), numeric, rtol=1e-5, atol=1e-5)

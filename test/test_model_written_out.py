@@ -31,7 +31,7 @@ def held_to_the_complex_step(model: RigModel, sample: Sample, modes: Array) -> N
     rotation(R_reference, x, R)
     mount = model.exciter_orientation
     assert solve(model.physics, modes, mount, x, R, force, wrench, K, r, inverse, z)
-    entries = np.array([*range(layout.effects_offset(model.cables)), EXCITER_CLOCK])
+    entries = np.array([*range(model.physics.size), EXCITER_CLOCK])
     dz = np.empty((size, model.states + 6 + entries.size))
     linearise(model.physics, modes, mount, R_reference, x, force, rate, z, inverse, entries, dz)
 
@@ -48,18 +48,21 @@ def held_to_the_complex_step(model: RigModel, sample: Sample, modes: Array) -> N
         assemble(pc, modes, mount, xc, Rc, fc, wrench, Kc, rc)
         return np.asarray(inverse @ ((rc - Kc @ z).imag / 1e-30))
 
-    rows = np.ones(size, dtype=bool)
-    if model.physics[layout.effects_offset(model.cables) + place.LINEAR_DENSITY] > 0.0:
+    density = layout.effects_offset(model.cables) + place.LINEAR_DENSITY
+    rows, not_cables = np.ones(size, dtype=bool), np.ones(size, dtype=bool)
+    not_cables[6 : 6 + model.cables] = False
+    if model.physics[density] > 0.0:
         # The weight of cables themselves at their cells stands in these rows as well
-        rows[6 : 6 + model.cables] = False
+        rows = not_cables
     for column in range(model.states):
         exact = by_complex_step(column, True)[rows]
         np.testing.assert_allclose(
             dz[rows, column], exact, rtol=1e-9, atol=1e-9 * np.max(np.abs(exact)) + 1e-9
         )
     for k, entry in enumerate(entries):
-        exact = by_complex_step(int(entry), False)[rows]
-        found = dz[rows, model.states + 6 + k]
+        kept = not_cables if entry == density else rows
+        exact = by_complex_step(int(entry), False)[kept]
+        found = dz[kept, model.states + 6 + k]
         np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * np.max(np.abs(exact)) + 1e-12)
 
 
@@ -94,6 +97,7 @@ def test_what_an_effect_does_not_answer_to_is_left_out_rightly(entry: int) -> No
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = 0.3, -0.2, 0.1
     physics[block + place.LAW_POINT : block + place.LAW_POINT + 3] = -0.3, 0.2, 0.4
     physics[block + place.PLATE_REACH] = 1.0
+    physics[block + place.ROLL_AXIS : block + place.ROLL_AXIS + 3] = 0.6, 0.8, 0.0
     model = model.with_physics(physics)
     model = model.with_internal(rider(60.0, np.array([0.3, 0.1, -0.5]), AXES[2:], 0.9, 0.05))
     model = model.with_internal(pendulum(30.0, np.array([0.1, 0.2, -0.4]), 1.4, 0.02))

@@ -53,7 +53,7 @@ def _drift(
         numbers = np.array([values[rate.name], values[settling.name]])
         moved, slopes = sensors.drift(np.array([duration]), numbers)
         return {
-            "drift": (float(moved[0, 0]), float(slopes[0, 0, 0] * stds[rate.name]), unit),
+            "drift": (float(moved[0, 0]), float(slopes()[0, 0, 0] * stds[rate.name]), unit),
             "settling_rate": (values[settling.name], stds[settling.name], "1/s"),
         }
 

@@ -29,9 +29,9 @@ from rig_identification.model.dynamics import (
 )
 from rig_identification.model.effects.all import (
     add_effects,
-    effects_act,
     effects_follow,
     effects_reach,
+    in_cable_rows,
 )
 from rig_identification.model.effects.cable_mass import weight_below_cell
 from rig_identification.model.effects.internal import ceiling_shift
@@ -115,26 +115,25 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
     weighty = physics.shape[0] > block and physics[block + LINEAR_DENSITY] != 0.0
     internal = (states - BODY_STATE) // 2
     air, heavy, rotor, hinged = effects_reach(physics, modes, internal)
-    acting = internal > 0 or effects_act(physics, modes)
-    following = effects_follow(physics, modes)
+    follow_place, follow_turn = effects_follow(physics, modes, internal)
     defect = np.zeros((size, states + directions.shape[0]))
     weight = np.zeros((n, states + directions.shape[0]))  # of the cables themselves, at their cells
     rotation(reference, x, R)
     body_and_cable_columns(physics, modes, x, R, z, defect[:, :states])
-    if acting:
-        for column in range(states):
-            if not following and (column < ROTATION or VELOCITY <= column < RATE):
-                continue
-            xc[column] = complex(x[column], STEP)
-            rotation(reference, xc, Rc)
-            Kc[:, :] = 0.0
-            rc[:] = 0.0
-            add_effects(pc, modes, xc, Rc, Kc, rc)
-            _add_defect(Kc, rc, z, defect[:, column])
-            if weighty:
-                for i in range(n):
-                    weight[i, column] = weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
-            xc[column] = x[column]
+    for column in range(states):
+        moved = column < ROTATION or VELOCITY <= column < RATE
+        if column < BODY_STATE and not (follow_place if moved else follow_turn):
+            continue
+        xc[column] = complex(x[column], STEP)
+        rotation(reference, xc, Rc)
+        Kc[:, :] = 0.0
+        rc[:] = 0.0
+        add_effects(pc, modes, xc, Rc, Kc, rc)
+        _add_defect(Kc, rc, z, defect[:, column])
+        if weighty:
+            for i in range(n):
+                weight[i, column] = weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
+        xc[column] = x[column]
     rotation(reference, xc, Rc)
     known = -1
     for column in range(directions.shape[0]):
@@ -161,8 +160,8 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
         pc[d] = complex(physics[d], STEP)
         Kc[:, :] = 0.0
         rc[:] = 0.0
-        if d >= block:
-            # A ceiling's numbers and the softness of redundant cables stand in all cables' rows
+        if d >= block and in_cable_rows(physics, modes, d):
+            # A ceiling's numbers and the softness of redundant cables
             for i in range(n):
                 add_cable(pc, i, modes, xc, Rc, Kc, rc)
         add_effects(pc, modes, xc, Rc, Kc, rc)

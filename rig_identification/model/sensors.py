@@ -6,7 +6,9 @@ own numbers, and returns a :class:`Reading`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +29,20 @@ GRAVITY = slice(layout.OUT_GRAVITY, layout.OUT_GRAVITY + 3)
 
 @dataclass(frozen=True)
 class Reading:
-    """Values (N, w), derivatives in the raw outputs (N, w, 18 + n) and in the device's numbers (N, w, q)."""
+    """Values (N, w), derivatives in the raw outputs (N, w, 18 + n) and in the device's numbers (N, w, q).
+
+    The last are worked out where they are asked for: a fit of a start alone, of which a search makes as many
+    as of everything, asks for none.
+    """
 
     values: Array
     in_raw: Array
-    in_device: Array
+    derive: Callable[[], Array]  # in_device
+
+    @cached_property
+    def in_device(self) -> Array:
+        """(N, w, q) derivatives in the device's numbers."""
+        return self.derive()
 
 
 def _mixed(pure: Reading, shares: Array) -> Reading:
@@ -42,18 +53,22 @@ def _mixed(pure: Reading, shares: Array) -> Reading:
     """
     nodes, width = pure.values.shape
     felt = shares.reshape(width, width) * (1.0 - np.eye(width))
-    own = pure
+    mix = np.eye(width) + felt
+
+    def in_device() -> Array:
+        own = mix @ pure.in_device if np.any(felt) else pure.in_device
+        numbers = own.shape[2]
+        out = np.zeros((nodes, width, numbers + width**2))
+        out[:, :, :numbers] = own
+        for i in range(width):
+            first = numbers + width * i
+            out[:, i, first : first + width] = pure.values
+            out[:, i, first + i] = 0.0
+        return out
+
     if np.any(felt):
-        mix = np.eye(width) + felt
-        own = Reading(pure.values @ mix.T, mix @ pure.in_raw, mix @ pure.in_device)
-    numbers = own.in_device.shape[2]
-    in_device = np.zeros((nodes, width, numbers + width**2))
-    in_device[:, :, :numbers] = own.in_device
-    for i in range(width):
-        first = numbers + width * i
-        in_device[:, i, first : first + width] = pure.values
-        in_device[:, i, first + i] = 0.0
-    return Reading(own.values, own.in_raw, in_device)
+        return Reading(pure.values @ mix.T, mix @ pure.in_raw, in_device)
+    return Reading(pure.values, pure.in_raw, in_device)
 
 
 #: drift, of each axis: rate, unit/s, and how fast it settles, 1/s
@@ -62,27 +77,36 @@ DRIFT_SIZE = 2
 STRAIGHT = 1e-4
 
 
-def drift(time: Array, device: Array) -> tuple[Array, Array]:
-    """What the zeros of a device's axes have moved by (N, w), and the derivatives (N, w, 2 w) in ``device``.
+def _drift_shapes(time: Array, k: float) -> tuple[Array, Array]:
+    """(N,) (1 - exp(-k t)) / k and its derivative in k; t and -t^2/2 where k is next to nothing."""
+    x = k * time
+    straight = np.abs(x) < STRAIGHT
+    safe = np.where(straight, 1.0, x)
+    fading = np.exp(-x)
+    shape = time * np.where(straight, 1.0 - 0.5 * x, (1.0 - fading) / safe)
+    return shape, time**2 * np.where(straight, x / 3.0 - 0.5, (fading * (1.0 + x) - 1.0) / safe**2)
+
+
+def drift(time: Array, device: Array) -> tuple[Array, Callable[[], Array]]:
+    """What the zeros of a device's axes have moved by (N, w), and what gives its derivatives (N, w, 2 w).
 
     time (N,): s after a recording's start. device (2 w,): of each axis the rate r at first, unit/s, and how
     fast k it settles, 1/s. A part that warms up towards its surroundings moves by r (1 - exp(-k t)) / k;
     where it does not settle within the recording, by r t.
     """
-    width = device.size // DRIFT_SIZE
-    values = np.zeros((time.size, width))
-    derivatives = np.zeros((time.size, width, device.size))
-    for axis in range(width):
-        rate, k = device[DRIFT_SIZE * axis : DRIFT_SIZE * (axis + 1)]
-        x = k * time
-        straight = np.abs(x) < STRAIGHT
-        safe = np.where(straight, 1.0, x)
-        fading = np.exp(-x)
-        shape = time * np.where(straight, 1.0 - 0.5 * x, (1.0 - fading) / safe)
-        bend = time**2 * np.where(straight, x / 3.0 - 0.5, (fading * (1.0 + x) - 1.0) / safe**2)
-        values[:, axis] = rate * shape
-        derivatives[:, axis, DRIFT_SIZE * axis] = shape
-        derivatives[:, axis, DRIFT_SIZE * axis + 1] = rate * bend
+    rates, settling = device.reshape(-1, DRIFT_SIZE).T
+    values = np.zeros((time.size, rates.size))
+    for axis in np.flatnonzero(rates):
+        values[:, axis] = rates[axis] * _drift_shapes(time, settling[axis])[0]
+
+    def derivatives() -> Array:
+        out = np.zeros((time.size, rates.size, device.size))
+        for axis, (rate, k) in enumerate(zip(rates, settling, strict=True)):
+            shape, bend = _drift_shapes(time, k)
+            out[:, axis, DRIFT_SIZE * axis] = shape
+            out[:, axis, DRIFT_SIZE * axis + 1] = rate * bend
+        return out
+
     return values, derivatives
 
 
@@ -91,10 +115,17 @@ def drifting(reading: Reading, time: Array, device: Array) -> Reading:
 
     The derivatives in ``device`` come after the device's other numbers.
     """
-    values, own = drift(time, device)
-    if reading.values.shape[0] == 1:
-        values, own = np.mean(values, axis=0, keepdims=True), np.mean(own, axis=0, keepdims=True)
-    in_device = np.concatenate([reading.in_device, own], axis=2)
+    values, derivatives = drift(time, device)
+    single = reading.values.shape[0] == 1
+    if single:
+        values = np.mean(values, axis=0, keepdims=True)
+
+    def in_device() -> Array:
+        own = derivatives()
+        if single:
+            own = np.mean(own, axis=0, keepdims=True)
+        return np.concatenate([reading.in_device, own], axis=2)
+
     return Reading(reading.values + values, reading.in_raw, in_device)
 
 
@@ -122,12 +153,16 @@ def load_cell(raw: Array, cable: int, device: Array) -> Reading:
     in_raw = np.zeros((nodes, 1, width))
     in_raw[:, 0, layout.OUT_TENSION :] = shares
     in_raw[:, 0, layout.OUT_TENSION + cable] = 1.0 + device[0] + 2.0 * device[2] * tension
-    in_device = np.empty((nodes, 1, device.size))
-    in_device[:, 0, 0] = tension
-    in_device[:, 0, 1] = 1.0
-    in_device[:, 0, 2] = tension**2
-    in_device[:, 0, LOAD_CELL_OWN:] = tensions
-    in_device[:, 0, LOAD_CELL_OWN + cable] = 0.0
+
+    def in_device() -> Array:
+        out = np.empty((nodes, 1, device.size))
+        out[:, 0, 0] = tension
+        out[:, 0, 1] = 1.0
+        out[:, 0, 2] = tension**2
+        out[:, 0, LOAD_CELL_OWN:] = tensions
+        out[:, 0, LOAD_CELL_OWN + cable] = 0.0
+        return out
+
     values = (1.0 + device[0] + device[2] * tension) * tension + device[1] + tensions @ shares
     return Reading(values[:, None], in_raw, in_device)
 
@@ -164,16 +199,21 @@ def imu(raw: Array, position: Array, orientation: Array, device: Array) -> Readi
     in_raw[:, 3:, ANGULAR_ACCELERATION] = -C_accel @ skew(r)
     # d(w x (w x r)) = -(skew(w x r) + skew(w) skew(r)) dw
     in_raw[:, 3:, RATE] = -C_accel @ (skew(np.cross(w, r)) + skew(w) @ skew(r))
-    in_device = np.zeros((nodes, 6, IMU_OWN))
-    in_device[:, 3:, 0:3] = C_accel @ (skew(alpha) + skew(w) @ skew(w))
-    J = left_jacobian(device[3:6])
-    in_device[:, :3, 3:6] = C_gyro @ skew(w) @ J
-    in_device[:, 3:, 3:6] = C_accel @ skew(at_imu) @ J
-    for i in range(3):
-        in_device[:, i, 6 + i] = 1.0
-        in_device[:, i, 9 + i] = (w @ to_imu.T)[:, i]
-        in_device[:, 3 + i, 12 + i] = 1.0
-        in_device[:, 3 + i, 15 + i] = (at_imu @ to_imu.T)[:, i]
+
+    def in_device() -> Array:
+        out = np.zeros((nodes, 6, IMU_OWN))
+        out[:, 3:, 0:3] = C_accel @ (skew(alpha) + skew(w) @ skew(w))
+        J = left_jacobian(device[3:6])
+        out[:, :3, 3:6] = C_gyro @ skew(w) @ J
+        out[:, 3:, 3:6] = C_accel @ skew(at_imu) @ J
+        pure_gyro, pure_accel = w @ to_imu.T, at_imu @ to_imu.T
+        for i in range(3):
+            out[:, i, 6 + i] = 1.0
+            out[:, i, 9 + i] = pure_gyro[:, i]
+            out[:, 3 + i, 12 + i] = 1.0
+            out[:, 3 + i, 15 + i] = pure_accel[:, i]
+        return out
+
     return _mixed(Reading(values, in_raw, in_device), device[IMU_OWN:])
 
 
@@ -199,11 +239,15 @@ def inclinometer(raw: Array, orientation: Array, device: Array) -> Reading:
     in_raw[:, :, GRAVITY] = (
         -(in_up - np.einsum("nij,nj->ni", in_up, up)[:, :, None] * up[:, None, :]) / size[:, :, None]
     )
-    # d(axis) = d x axis: up . (d x axis) = d . (axis x up)
-    turned = np.cross(turn[:, :2].T[None], up[:, None, :])
-    in_device = np.zeros((nodes, 2, INCLINOMETER_SIZE))
-    in_device[:, :, :3] = slope[:, :, None] * turned @ left_jacobian(device[:3])
-    in_device[:, :, 3:] = np.eye(2)
+
+    def in_device() -> Array:
+        # d(axis) = d x axis: up . (d x axis) = d . (axis x up)
+        turned = np.cross(turn[:, :2].T[None], up[:, None, :])
+        out = np.zeros((nodes, 2, INCLINOMETER_SIZE))
+        out[:, :, :3] = slope[:, :, None] * turned @ left_jacobian(device[:3])
+        out[:, :, 3:] = np.eye(2)
+        return out
+
     return Reading(np.arcsin(sine) + device[3:5], in_raw, in_device)
 
 
@@ -245,11 +289,15 @@ def mocap(
     in_raw[:, :3, POSITION] = R_tw
     in_raw[:, :3, ROTATION] = -R_tb @ skew(r)
     in_raw[:, 3:, ROTATION] = J_inverse @ R_bm.T
-    in_device = np.zeros((nodes, 6, MOCAP_SIZE))
-    in_device[:, :3, 0:3] = R_tb
-    in_device[:, 3:, 3:6] = J_inverse @ R_bm.T @ left_jacobian(device[3:6])
-    in_device[:, :3, 6:9] = np.eye(3)
-    J_tracker = left_jacobian(device[9:12])
-    in_device[:, :3, 9:12] = -skew(position - shift) @ J_tracker
-    in_device[:, 3:, 9:12] = J_inverse @ (R_tb @ R_bm).transpose(0, 2, 1) @ J_tracker
+
+    def in_device() -> Array:
+        out = np.zeros((nodes, 6, MOCAP_SIZE))
+        out[:, :3, 0:3] = R_tb
+        out[:, 3:, 3:6] = J_inverse @ R_bm.T @ left_jacobian(device[3:6])
+        out[:, :3, 6:9] = np.eye(3)
+        J_tracker = left_jacobian(device[9:12])
+        out[:, :3, 9:12] = -skew(position - shift) @ J_tracker
+        out[:, 3:, 9:12] = J_inverse @ (R_tb @ R_bm).transpose(0, 2, 1) @ J_tracker
+        return out
+
     return Reading(np.concatenate([position, turn], axis=1), in_raw, in_device)

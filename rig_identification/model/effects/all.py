@@ -21,12 +21,14 @@ from rig_identification.model.effects.place import (
     BENDING,
     DAMPING,
     DRAG_AREA,
+    EFFECTS_SIZE,
     FRICTION,
     GYROSCOPIC_SHARE,
     LINEAR_DENSITY,
     PLATES,
     ROLL_STIFFNESS,
     ROTOR_MASS,
+    SHARING,
     TETHER_POINT,
     TORSION,
     TURNING_CUBE,
@@ -35,7 +37,17 @@ from rig_identification.model.effects.place import (
 from rig_identification.model.effects.point_law import add_point_law
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.effects.turning_cube import add_turning_cube
-from rig_identification.model.layout import CABLE_SIZE, CABLES
+from rig_identification.model.layout import CABLE_SIZE, CABLES, CEILING, INTERNAL_SIZE, KIND
+
+
+@njit(cache=True)
+def _riders(physics, modes, internal):  # type: ignore[no-untyped-def]
+    """Whether any internal coordinate is a mass that rides: a ceiling's feels nothing but the cables."""
+    first = CABLES + CABLE_SIZE * modes.shape[0] + EFFECTS_SIZE
+    riding = False
+    for j in range(internal):
+        riding = riding or physics[first + INTERNAL_SIZE * j + KIND].real != CEILING
+    return riding
 
 
 @njit(cache=True)
@@ -51,35 +63,35 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
     hinges = hinges or active(physics[block + BENDING]) or active(physics[block + ROLL_STIFFNESS])
     hinges = hinges or active(physics[block + TORSION])
-    return body, rotor or rods or internal > 0, rotor, rods or hinges
+    return body, rotor or rods or _riders(physics, modes, internal), rotor, rods or hinges
 
 
 @njit(cache=True)
-def effects_act(physics, modes):  # type: ignore[no-untyped-def]
-    """Whether any effect of the block acts on the body."""
-    block = CABLES + CABLE_SIZE * modes.shape[0]
-    if physics.shape[0] <= block:
-        return False
-    acting = False
-    for i in range(TETHER_POINT):
-        acting = acting or active(physics[block + i])
-    return acting
+def effects_follow(physics, modes, internal):  # type: ignore[no-untyped-def]
+    """Whether any effect answers to where the body is or how fast it goes; to how it is turned or turns.
 
-
-@njit(cache=True)
-def effects_follow(physics, modes):  # type: ignore[no-untyped-def]
-    """Whether any effect answers to where the body is or how fast it goes, beside how it is turned and turns.
-
-    What rides on the body or turns with it does not; hinges, air, cables' own mass and what it is tied to do.
+    Hinges, air, cables' own mass and what the body is tied to answer to both; what rides on the body or turns
+    with it to the second alone.
     """
     block = CABLES + CABLE_SIZE * modes.shape[0]
     if physics.shape[0] <= block:
-        return False
-    following = False
+        return False, False
+    place, turn = False, _riders(physics, modes, internal)
     for i in range(TETHER_POINT):
-        rides = i in (ADDED_MASS, ROTOR_MASS, GYROSCOPIC_SHARE, TURNING_CUBE)
-        following = following or (not rides and active(physics[block + i]))
-    return following
+        if active(physics[block + i]):
+            turn = True
+            place = place or i not in (ADDED_MASS, ROTOR_MASS, GYROSCOPIC_SHARE, TURNING_CUBE)
+    return place, turn
+
+
+@njit(cache=True)
+def in_cable_rows(physics, modes, number):  # type: ignore[no-untyped-def]
+    """Whether a number behind the cables' blocks stands in the cables' own equations."""
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    if number == block + SHARING:
+        return True
+    behind = number - block - EFFECTS_SIZE
+    return behind >= 0 and physics[number - behind % INTERNAL_SIZE + KIND].real == CEILING
 
 
 @njit(cache=True)
