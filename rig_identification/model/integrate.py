@@ -160,7 +160,7 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
         pc[d] = complex(physics[d], STEP)
         Kc[:, :] = 0.0
         rc[:] = 0.0
-        if d >= block and in_cable_rows(physics, modes, d):
+        if in_cable_rows(physics, modes, d):
             # A ceiling's numbers and the softness of redundant cables
             for i in range(n):
                 add_cable(pc, i, modes, xc, Rc, Kc, rc)

@@ -53,22 +53,22 @@ def _mixed(pure: Reading, shares: Array) -> Reading:
     """
     nodes, width = pure.values.shape
     felt = shares.reshape(width, width) * (1.0 - np.eye(width))
-    mix = np.eye(width) + felt
+    own = pure
+    if np.any(felt):
+        mix = np.eye(width) + felt
+        own = Reading(pure.values @ mix.T, mix @ pure.in_raw, lambda: mix @ pure.in_device)
 
     def in_device() -> Array:
-        own = mix @ pure.in_device if np.any(felt) else pure.in_device
-        numbers = own.shape[2]
+        numbers = own.in_device.shape[2]
         out = np.zeros((nodes, width, numbers + width**2))
-        out[:, :, :numbers] = own
+        out[:, :, :numbers] = own.in_device
         for i in range(width):
             first = numbers + width * i
             out[:, i, first : first + width] = pure.values
             out[:, i, first + i] = 0.0
         return out
 
-    if np.any(felt):
-        return Reading(pure.values @ mix.T, mix @ pure.in_raw, in_device)
-    return Reading(pure.values, pure.in_raw, in_device)
+    return Reading(own.values, own.in_raw, in_device)
 
 
 #: drift, of each axis: rate, unit/s, and how fast it settles, 1/s
