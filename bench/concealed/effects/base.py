@@ -44,6 +44,8 @@ class Effect:
     mechanical = False  # the motion changes, not only what is read
     aside = False  # the body must be released from rest under a pull: from the level pose it would bounce
     own_cables = False  # the effect replaces the rigid cables by its own
+    stretches = False  # its cables do not keep their length
+    lets_go = False  # its cables do not push
 
     @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> Effect:

@@ -22,6 +22,7 @@ class CableElasticity(Effect):
     mechanical = True
     aside = True
     own_cables = True
+    stretches = True
     axial_stiffness: float  # N
     damping_ratio: float  # 1
 

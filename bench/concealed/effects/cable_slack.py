@@ -27,6 +27,7 @@ class CableSlack(Effect):
     name = "cable_slack"
     mechanical = True
     own_cables = True
+    lets_go = True
     violence: float  # how much more pull and force than the calm run has
 
     @classmethod
