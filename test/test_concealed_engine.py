@@ -142,7 +142,8 @@ def test_cables_that_let_go_report_what_acted() -> None:
     assert 0.02 < np.mean(loose) < 0.9
     near = np.convolve(loose, np.ones(101), mode="same") > 0.0
     assert np.mean(near) < 0.95
-    assert np.abs(_unbalanced(violent, path)[~near]).max() < 1e-4
+    # At the first and the last row differences are one-sided
+    assert np.abs(_unbalanced(violent, path)[1:-1][~near[1:-1]]).max() < 1e-4
 
 
 def test_heavy_cables_report_what_acted() -> None:

@@ -11,10 +11,13 @@ import numpy as np
 
 from bench.concealed.draw import scaled
 from bench.concealed.effects.base import Effect, quantity
-from bench.concealed.mechanism import CONSTRAINT_TIME, IMPEDANCE
 from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
+# MuJoCo's limits act only where they are exceeded. A cable that yields by less than a step's truncation,
+# 1e-8 m, lets go under thousands of newtons for a step and snaps; these yield by micrometres, as of 5 GN.
+LIMIT_TIME = 0.005  # s
+LIMIT_IMPEDANCE = 0.99
 LEAST_SLACK = 0.02  # s, of one cable over the session
 GRAZE = 0.003  # s: shorter than that a cable was never loose
 REBOUND = 0.2  # s: a cable that snaps tight bounces; that is one spell
@@ -55,8 +58,8 @@ class CableSlack(Effect):
                 name=f"cable_{i}",
                 limited=True,
                 range=[0.0, length],
-                solref_limit=[CONSTRAINT_TIME, 1.0],
-                solimp_limit=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+                solref_limit=[LIMIT_TIME, 1.0],
+                solimp_limit=[LIMIT_IMPEDANCE, LIMIT_IMPEDANCE, 0.001, 0.5, 2.0],
             )
             tendon.wrap_site(f"ceiling_{i}")
             tendon.wrap_site(f"hinge_{i}")
