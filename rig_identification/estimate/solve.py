@@ -108,8 +108,8 @@ def _prior(problem: Problem, theta: Array) -> tuple[float, Array, Array]:
 def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) -> Evaluation | None:
     """Linearise everything at ``point``; None where a run or a rest pose cannot be computed.
 
-    residuals_only: residuals and cost hold, what else is derived from derivatives does not; it takes a
-    quarter of the time.
+    residuals_only: residuals and cost hold, what else is derived from the runs' derivatives does not; it
+    takes a quarter of the time.
     """
     if not (np.all(np.isfinite(point.theta)) and all(start.is_finite for start in point.starts)):
         # A step so long that no number holds it, or its start cannot be put back onto the cables
@@ -447,7 +447,7 @@ def solve(
             trial = evaluate(problem, moved, residuals_only=True) if wary else None
             spent += QUICK if wary else 0.0
             if not wary or (trial is not None and trial.cost < allowed):
-                trial = evaluate(problem, moved)
+                trial = _in_full(problem, moved, trial)
                 spent += 1.0
             if trial is not None and trial.cost >= allowed:
                 change = _pulled_back(problem, current, damping, change, trial)
@@ -455,7 +455,7 @@ def solve(
                 trial = evaluate(problem, moved, residuals_only=True)
                 spent += QUICK
                 if trial is not None and current.cost - trial.cost > KEPT * gain:
-                    trial = evaluate(problem, moved)
+                    trial = _in_full(problem, moved, trial)
                     spent += 1.0
                 else:
                     trial = None
@@ -485,6 +485,11 @@ def solve(
         if stop is not None and stop():
             break
     return current, False
+
+
+def _in_full(problem: Problem, point: Point, quick: Evaluation | None) -> Evaluation | None:
+    """Everything at ``point``, of which ``quick`` holds the residuals; all of them there is without runs."""
+    return evaluate(problem, point) if problem.runs or quick is None else quick
 
 
 def shortened(problem: Problem, end: float) -> Problem:

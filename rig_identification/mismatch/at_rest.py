@@ -33,8 +33,9 @@ from rig_identification.mismatch.unbent import as_described, at_first
 ASIDE = (0.3, -0.3)
 #: Nats that are none at all: what only motion shows.
 NONE = 1e-9
-#: Steps of a fit.
-STEPS = 10
+#: Steps of a fit, and after how many it is seen where it leads; nats behind what explains rest, to the noise,
+#: that no fit is followed to.
+STEPS, SURE, FAR_BEHIND = 10, 4, 60.0
 #: Nats within which rest tells next to nothing between two.
 CLOSE = 5.0
 #: Hypotheses of one effect that are told: its other places are its rivals anyway.
@@ -70,19 +71,22 @@ def at_rest(
     if without is None or _quiet(still, without):
         return []
     out = []
+    least = np.inf  # cost of what explains rest best, to the noise
     for candidate in _shown_at_rest(still, without, candidates):
         if budget.spent():
             break
-        best = _with(candidate, still, without.point)
+        best = _with(candidate, still, without.point, least + FAR_BEHIND)
         if best is None:
             continue
         wide, fitted = best
+        quiet = _quiet(wide, fitted)
+        least = min(least, fitted.cost) if quiet else least
         gain = log_evidence(fitted) - log_evidence(without)
         if gain > needed_gain(candidate, count_of(candidates)):
             named = wide.bench.parameters.named(fitted.point.theta)
             gain -= float(np.log(candidate.places))
             promise = Promise(candidate, gain, {q.name: named[q.name] for q in candidate.parameters})
-            out.append(AtRest(promise, carried(still, wide, fitted.point).theta, _quiet(wide, fitted)))
+            out.append(AtRest(promise, carried(still, wide, fitted.point).theta, quiet))
     most = max((a.promise.gain for a in out), default=0.0)
     moving = {p.candidate.label: p.gain for p in promises}
 
@@ -209,8 +213,10 @@ def _quiet(still: Problem, without: Evaluation) -> bool:
     return used + left < sum(r.residual.size for r in without.rests)
 
 
-def _with(candidate: Candidate, still: Problem, point: Point) -> tuple[Problem, Evaluation] | None:
-    """The likeliest fit with a candidate in."""
+def _with(
+    candidate: Candidate, still: Problem, point: Point, near: float = np.inf
+) -> tuple[Problem, Evaluation] | None:
+    """The likeliest fit with a candidate in. near: cost that is worth going on for."""
     wide = extended(still, (candidate,))
     begun = carried(wide, still, point)
     first = wide.bench.parameters.index_of(candidate.parameters[0].name)
@@ -219,13 +225,29 @@ def _with(candidate: Candidate, still: Problem, point: Point) -> tuple[Problem, 
     for aside in sides:
         theta = begun.theta.copy()
         theta[first] = aside
-        fits.append(_fitted(wide, replace(begun, theta=theta)))
+        fits.append(_fitted(wide, replace(begun, theta=theta), near))
     best = min((f for f in fits if f is not None), key=lambda f: f.cost, default=None)
     return None if best is None else (wide, best)
 
 
-def _fitted(problem: Problem, point: Point) -> Evaluation | None:
+def _fitted(problem: Problem, point: Point, near: float = np.inf) -> Evaluation | None:
+    costs: list[float] = []
+
+    def hopeless() -> bool:
+        """Whether as many steps as are left, each winning what the last one did, do not come ``near``."""
+        if len(costs) < SURE:
+            return False
+        return costs[-1] - (STEPS - len(costs)) * (costs[-2] - costs[-1]) > near
+
     try:
-        return solve(problem, point, iterations=STEPS, tolerance=0.05, polish=POLISH)[0]
+        return solve(
+            problem,
+            point,
+            iterations=STEPS,
+            tolerance=0.05,
+            polish=POLISH,
+            notify=lambda _, cost: costs.append(cost),
+            stop=hopeless,
+        )[0]
     except FloatingPointError:
         return None

@@ -87,6 +87,7 @@ class Look:
     hopeless: set[str] = field(default_factory=set)  # labels of what was begun and led nowhere
     asked: list[Promise] = field(default_factory=list)  # by rest, most of all
     moving: bool = False  # whether rest asks for next to nothing, and no change of numbers promises much
+    weighed: set[str] = field(default_factory=set)  # labels of what the scale leaves no other choice than
     rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
     slowly: list[Promise] = field(default_factory=list)  # along the measured motion, what is fitted slowly
@@ -252,6 +253,47 @@ class Look:
         self.rung |= {p.candidate.label for p in new}
         self.begin(new)
 
+    def as_weighed(self) -> None:
+        """What acts on the body and alone explains it at rest, where the scale was wrong, beside one more.
+
+        The scale weighed no cables and no exciter's rotor. Equilibrium holds no valleys of a motion out of
+        step, and no wrench along the measured motion accounts for what the scale did not weigh: with that in
+        the model first, the motion tells what it has besides.
+        """
+        if self.alone.measured is None:
+            return
+        heavy = [c for c in self.candidates if acts(c)]
+        if not any(a.settles for a in at_rest(self.here, self.seen, heavy, self.budget)):
+            return
+        self.notify("what rest asks for")
+        most = max(a.promise.gain for a in self._hanging)
+        settled = [a for a in self._hanging if a.settles and a.promise.gain > most - BEATEN]
+        if most < BEATEN or not settled or not all(acts(a.promise.candidate) for a in settled):
+            return
+        for found in settled:
+            self._fit_as_it_hangs(found)
+        self.weighed = {a.promise.candidate.label for a in settled}
+        if not self.enough:
+            ended = [self.finished(t) for t in list(self.tried) if t.candidate.label in self.weighed]
+            self.certain = self._beside_each([t for t in ended if t is not None])
+
+    @cached_property
+    def _hanging(self) -> list[AtRest]:
+        """What the static recordings ask for, likeliest first."""
+        return at_rest(self.here, self.seen, self.candidates, self.budget, self.promises)[:MOST]
+
+    def _fit_as_it_hangs(self, found: AtRest) -> None:
+        """A fit to the motion of what rest asks for, from the rig as it hangs with it."""
+        start = from_rest(self.here, self.seen, found)
+        starts = [self.seen] if start is None else [start, self.seen]
+        if gives_way(self.here.bench.parameters.model):
+            # With something that swings or rings in the model a fit takes many seconds
+            starts = [min(starts, key=lambda s: s.cost)]
+        self.notify(found.promise.candidate.label)
+        trial, _ = best_of(self.here, starts, found.promise, self.budget)
+        if trial is not None:
+            self.tried.append(trial)
+
     def at_rest(self) -> None:
         """What the static recordings ask for by themselves, started where they have it.
 
@@ -259,7 +301,7 @@ class Look:
         that is off is alike to a ceiling off level.
         """
         self.notify("what rest asks for")
-        asked = at_rest(self.here, self.seen, self.candidates, self.budget, self.promises)[:MOST]
+        asked = self._hanging
         most = max((a.promise.gain for a in asked), default=0.0)
         # A few nats that rest asks for are no reason for so much motion
         asked = asked if most > BEATEN else []
@@ -268,15 +310,8 @@ class Look:
             behind = most - found.promise.gain
             if self.budget.spent() or (self.at_noise and behind > BEATEN):
                 break
-            start = from_rest(self.here, self.seen, found)
-            starts = [self.seen] if start is None else [start, self.seen]
-            if gives_way(self.here.bench.parameters.model):
-                # With something that swings or rings in the model a fit takes many seconds
-                starts = [min(starts, key=lambda s: s.cost)]
-            self.notify(found.promise.candidate.label)
-            trial, _ = best_of(self.here, starts, found.promise, self.budget)
-            if trial is not None:
-                self.tried.append(trial)
+            if found.promise.candidate.label not in self.weighed:
+                self._fit_as_it_hangs(found)
         if not self.enough:
             self.certain = self._certain(asked) or self._two_at_rest(asked)
         soon = max((p.share for p in self.promises if not p.candidate.slow), default=0.0)
@@ -297,6 +332,7 @@ class Look:
         if excess(alike[0].evaluation) <= (1.0 - DIRECT) * excess(self.seen):
             first = self.finished(alike[0])
             return [] if first is None else [first]
+        alike = [t for t in alike if t.candidate.label not in self.weighed]
         settled = [t for t in alike if sure[id(t.candidate)].settles]
         ended = [t for t in map(self.finished, settled) if t is not None]
         return self._beside_each(ended)

@@ -44,9 +44,24 @@ class Trials:
     done: list[Trial]
     liar: str | None = None
     beaten: tuple[Trial, ...] = ()  # settled, significant, and yet far less likely than the first
+    unsure: tuple[Trial, ...] = ()  # significant, with an amount that may as well be none: never told first
     lawful: Explained | None = None  # what explains the session instead
     led: bool = False  # the first leads to another one, with which nothing is left
     chief: bool = True  # whether the first takes the larger part of what was left away
     beside: tuple[Trial, ...] = ()  # what it leads to, likeliest first, where that is fitted already
     asked: bool = False  # whether rivals of that were asked as well
     left: float = 0.0  # nats, without any of them
+
+    def rivals_of(self, chosen: Trial) -> list[tuple[float, Trial]]:
+        """What is stated beside ``chosen``, and by how much (nats) it trails.
+
+        What no data refuted before it; and what is as likely, be it that its amount may as well be none: two
+        that the data cannot tell apart are both stated, and the body is as uncertain as they make it.
+        """
+        likely = [(chosen.evidence - t.evidence, t) for t in self.done if t is not chosen]
+        tied = [
+            (max(0.0, chosen.evidence - t.evidence), t)
+            for t in self.unsure
+            if t.candidate.kind != chosen.candidate.kind and chosen.evidence - t.evidence < MEANT
+        ]
+        return [(gap, t) for gap, t in likely if gap >= 0.0] + tied

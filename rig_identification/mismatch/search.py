@@ -125,7 +125,7 @@ def _from_afar(look: Look, more: bool) -> tuple[Trial | None, list[Trial]]:
     Each witness is asked only where those before it leave something. What takes nearly all away is asked at
     once whether with one more it leaves nothing.
     """
-    for witness in (look.as_measured, look.slowly_as_measured, look.outright):
+    for witness in (look.as_weighed, look.as_measured, look.slowly_as_measured, look.outright):
         witness()
         if more and look.certain:
             return None, look.certain

@@ -56,11 +56,7 @@ class Search:
         in_passing: what it leads to is adopted next.
         """
         self.found.append(chosen)
-        others = [
-            (chosen.evidence - t.evidence, t)
-            for t in tried.done
-            if t is not chosen and t.evidence <= chosen.evidence
-        ]
+        others = tried.rivals_of(chosen)
         self.rivals += [rival(t, gap) for gap, t in others]
         self.bodies = ()
         if self.whole:

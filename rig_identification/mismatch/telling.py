@@ -81,6 +81,7 @@ def ended(look: Look) -> Trials:
     tried = sorted((_fair(look, t) for t in look.tried), key=lambda t: -t.evidence)
     done: list[Trial] = []
     beaten: list[Trial] = []
+    unsure: list[Trial] = []
     for trial in tried:
         last = any(look.enough_with(t) for t in done) and _beaten(trial, done, tried[0], look.far)
         if len(done) == FINISHED or ((last or (done and look.budget.spent())) and not trial.settled):
@@ -94,15 +95,21 @@ def ended(look: Look) -> Trials:
         fitted = as_it_stands(plain) if lone else finished(plain, look.budget)
         if fitted is None or not beyond_doubt(fitted, look.ordinary, look.limit):
             continue
-        if not look.far and not amount_seen(fitted) and not _missed(look, fitted):
-            # It explains something, with an amount that may as well be none: it stands in for another
-            continue
+        # What explains something with an amount that may as well be none stands in for another
+        doubtful = not look.far and not amount_seen(fitted) and not _missed(look, fitted)
         fitted = _fair(look, fitted)
         if fitted.evidence > look.needed:
-            _place(fitted, beaten if last else done)
+            _place(fitted, unsure if doubtful else beaten if last else done)
     told = told_of(look, done)
     chief = bool(told) and excess(told[0].evaluation) < CHIEF * look.left
-    return Trials(told, look.device, tuple(map(among_places, beaten)), chief=chief, left=look.left)
+    return Trials(
+        told,
+        look.device,
+        tuple(map(among_places, beaten)),
+        tuple(map(among_places, unsure)),
+        chief=chief,
+        left=look.left,
+    )
 
 
 def _fair(look: Look, trial: Trial) -> Trial:

@@ -66,7 +66,7 @@ def likeliest_whole(
         for t, found, _ in heard
         if t is not chosen
     ]
-    others = [(first.evidence - t.evidence, t) for t in tried.done if id(t) not in said]
+    others = [(gap, t) for gap, t in tried.rivals_of(first) if id(t) not in said]
     stated = sorted([*gaps, *others], key=lambda gap: gap[0])
     search.rivals = [*before.rivals, *(rival(t, gap) for gap, t in stated)]
     seen = stated if before.whole else gaps

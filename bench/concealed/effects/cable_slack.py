@@ -15,8 +15,8 @@ from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
 # MuJoCo's limits act only where they are exceeded. A cable that yields by less than a step's truncation,
-# 1e-8 m, lets go under thousands of newtons for a step and snaps; these yield by micrometres, as of 5 GN.
-LIMIT_TIME = 0.005  # s
+# 1e-8 m, lets go under thousands of newtons for a step and snaps; these yield by a micrometre.
+LIMIT_TIME = 0.002  # s
 LIMIT_IMPEDANCE = 0.99
 LEAST_SLACK = 0.02  # s, of one cable over the session
 GRAZE = 0.003  # s: shorter than that a cable was never loose
