@@ -12,14 +12,17 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import ORDINARY, fit_ideal, fit_session
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.along_measured import Along
 from rig_identification.mismatch.at_rest import ALIKE, at_rest, both_at_rest, from_rest
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.first_fits import AT_NOISE
 from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.outcome import Alone
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.search import trials
 from rig_identification.mismatch.standing import short_pieces
-from rig_identification.mismatch.trial import attempt, fitted_from
+from rig_identification.mismatch.trial import VERY_FAR, attempt, fitted_from
 from rig_identification.recording import Recording
 from rig_identification.simulate import simulate_session
 
@@ -104,6 +107,31 @@ def test_what_rest_is_certain_of_leads_to_what_swings_beside_it() -> None:
     turn = found.done[0].problem.bench.parameters.named(found.done[0].evaluation.point.theta)
     assert abs(turn["imu.orientation.y"] - TURNED) < 0.2 * TURNED
     assert misfit(found.done[0].evaluation) > NEAR_SQUARE
+
+
+def test_what_the_scale_did_not_weigh_comes_before_what_moves_beside_it() -> None:
+    """Along the measured motion nothing would be asked: the rotor is known from rest, the hinges beside it."""
+    problem, evaluation = _fitted({"exciter_rotor": (25.0,), "hinge_damping": (300.0,)})
+    assert misfit(evaluation) > VERY_FAR
+    asked: list[str] = []
+
+    def measured(candidates: list[Candidate]) -> Along:
+        asked.append("along the measured motion")
+        return Along([])
+
+    found = trials(
+        problem,
+        evaluation,
+        catalogue(problem),
+        ORDINARY,
+        asked.append,
+        more=True,
+        alone=Alone(measured=measured),
+    )
+    assert found.led
+    assert found.done[0].candidate.effect == "exciter_rotor"
+    assert found.beside[0].candidate.effect == "hinge_damping"
+    assert "along the measured motion" not in asked
 
 
 @pytest.fixture(scope="module")

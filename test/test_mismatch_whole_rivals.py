@@ -14,7 +14,7 @@ from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import FITTED, catalogue, count_of, needed_gain, worth_a_fit
-from rig_identification.mismatch.outcome import Trials
+from rig_identification.mismatch.outcome import MEANT, Trials
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, among_places, attempt, finished, mass_of
@@ -111,6 +111,23 @@ def test_what_leaves_a_trace_is_kept_where_what_leaves_none_is_far_less_likely(
     (damping, with_damping), (drag, with_drag) = found
     assert outdone(ideal, damping, with_damping, drag, with_drag)
     assert not outdone(ideal, drag, with_drag, damping, with_damping)
+
+
+def test_a_tie_is_stated_though_its_amount_may_as_well_be_none(search: Search) -> None:
+    """A hose of 7 noises was told as entrained air, and nothing was said of the hose (session 14240)."""
+    candidates = {c.label: c for c in catalogue(search.problem)}
+
+    def fitted(label: str, evidence: float) -> Trial:
+        return Trial(candidates[label], search.problem, search.evaluation, evidence, True)
+
+    air, drag = fitted("air_added_mass", 10.0), fitted("air_drag", 2.0)
+    hose, damping = fitted("tether x", 10.5), fitted("hinge_damping", 10.0 - MEANT)
+    tried = Trials([air, drag], unsure=(hose, damping))
+    assert tried.rivals_of(air) == [(8.0, drag), (0.0, hose)]
+    # What is told is no rival of itself, wherever it acts, and what is likelier than it was refuted before
+    along_y = fitted("tether y", 10.0)
+    assert tried.rivals_of(along_y) == [(0.0, air), (8.0, drag)]
+    assert tried.rivals_of(drag) == [(0.0, hose), (0.0, damping)]
 
 
 def test_slow_hypotheses_take_no_place_from_quick_ones(search: Search) -> None:
