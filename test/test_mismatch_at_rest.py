@@ -110,7 +110,7 @@ def test_what_rest_is_certain_of_leads_to_what_swings_beside_it() -> None:
 
 
 def test_what_the_scale_did_not_weigh_comes_before_what_moves_beside_it() -> None:
-    """Along the measured motion nothing would be asked: the rotor is known from rest, the hinges beside it."""
+    """Rest tells the rotor, and beside it the hinges show: the measured motion is not asked."""
     problem, evaluation = _fitted({"exciter_rotor": (25.0,), "hinge_damping": (300.0,)})
     assert misfit(evaluation) > VERY_FAR
     asked: list[str] = []
