@@ -383,15 +383,24 @@ def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
 
 
 def fit_again(ideal: Ideal, runs: tuple[Run, ...], held: tuple[Run, ...], notify: Progress) -> Ideal:
+    """The ideal model fitted to other stretches of its session's runs, to short pieces too where it fails."""
+    return in_pieces_if_far(fitted_again(ideal, runs, held, notify), notify)
+
+
+def in_pieces_if_far(again: Fitted, notify: Progress) -> Ideal:
+    """A fit of the ideal model, judged; fitted to short pieces as well where it fails by far."""
+    found = Ideal(again, *judged(again))
+    return found if near_noise(again) else with_pieces(found, notify)
+
+
+def fitted_again(ideal: Ideal, runs: tuple[Run, ...], held: tuple[Run, ...], notify: Progress) -> Fitted:
     """The ideal model fitted to other stretches of its session's runs, from where nothing is bent."""
     fitted = ideal.fitted
     problem = replace(fitted.problem, runs=runs)
     point = fitted.guess or fitted.evaluation.point
     starts = launch_states(problem.bench, runs, point.theta, fitted.rest)
     start = Start(problem, replace(point, starts=starts), fitted.rest, held, fitted.notes, fitted.held_parts)
-    again = fit_from(start, notify)
-    found = Ideal(again, *judged(again))
-    return found if near_noise(again) else with_pieces(found, notify)
+    return fit_from(start, notify)
 
 
 def judged(fitted: Fitted) -> tuple[Scores, Mismatch]:

@@ -26,6 +26,7 @@ from rig_identification.mismatch.push import (
     chiefly,
     nothing_known,
     outside,
+    outside_of_event,
     outside_of_pulse,
     push_beside,
     shows_beside,
@@ -113,7 +114,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         pushed = without_push(ideal, problem, here, evaluation, pulse, notify, calm)
         pushed = pushed or _beside_push(ideal, here, evaluation, notify, budget, calm)
         if pushed is None and very_far:
-            pushed = _beside_event(ideal, here, burst(here, evaluation), notify, budget)
+            pushed = _beside_event(ideal, here, burst(here, evaluation), notify, budget, chief=True)
         if pushed is not None:
             return pushed
     near = search.whole
@@ -170,16 +171,21 @@ def _beside_push(
     calm: Calmed = nothing_known,
 ) -> Explained | None:
     """What explains the session outside a push; None where nothing pushes, or nothing explains the rest."""
-    return _beside_event(ideal, here, push_beside(here, evaluation, notify, calm), notify, budget)
+    event = push_beside(here, evaluation, notify, calm)
+    return _beside_event(ideal, here, event, notify, budget, chief=misfit(evaluation) > VERY_FAR)
 
 
 def _beside_event(
-    ideal: Ideal, here: Problem, event: Event | None, notify: Notify, budget: Budget
+    ideal: Ideal, here: Problem, event: Event | None, notify: Notify, budget: Budget, *, chief: bool = False
 ) -> Explained | None:
-    """What explains the session outside an event; None where there is none, or nothing explains the rest."""
+    """What explains the session outside an event; None where there is none, or nothing explains the rest.
+
+    chief: whether the rest is worth a search only where the event has the larger part of what is wrong.
+    """
     if event is None:
         return None
-    found = _explain(outside(ideal, event.recording, event.start, event.end, notify), notify, budget)
+    rest = outside_of_event(ideal, event, notify, chief=chief)
+    found = None if rest is None else _explain(rest, notify, budget)
     if found is None or not found.told:
         return None
     return with_push(found, ideal, here, event)

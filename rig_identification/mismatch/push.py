@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.identify import Ideal, fit_again, judged
+from rig_identification.estimate.identify import Ideal, fitted_again, in_pieces_if_far, judged
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.estimate.whole import fit_whole
+from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.locate import CALM, Calm, Event, at_an_end, find_event
 from rig_identification.mismatch.outcome import Trials
@@ -172,10 +173,26 @@ def push_too(ideal: Ideal, before: Search, tried: Trials, search: Search, notify
 
 def outside(ideal: Ideal, recording: str, start: float, end: float, notify: Notify) -> Ideal:
     """The ideal model fitted to all but the seconds of a recording in which something pushes."""
+    return in_pieces_if_far(_fitted_outside(ideal, recording, start, end, notify), notify)
+
+
+def outside_of_event(ideal: Ideal, event: Event, notify: Notify, *, chief: bool) -> Ideal | None:
+    """The ideal model outside of an event.
+
+    chief: None where most of what is wrong is wrong there as well. What rings has its strongest second,
+    too, and a search of the rest takes all the time there is.
+    """
+    fitted = _fitted_outside(ideal, event.recording, event.start, event.end, notify)
+    if chief and excess(fitted.evaluation) > CHIEF * excess(ideal.fitted.evaluation):
+        return None
+    return in_pieces_if_far(fitted, notify)
+
+
+def _fitted_outside(ideal: Ideal, recording: str, start: float, end: float, notify: Notify) -> Fitted:
     fitted = ideal.fitted
     runs = all_without(fitted.problem.runs, recording, start, end)
     held = all_without(fitted.holdout_runs, recording, start, end)
-    return fit_again(ideal, runs, (*held, *fitted.lost), notify)
+    return fitted_again(ideal, runs, (*held, *fitted.lost), notify)
 
 
 def with_push(found: Explained, ideal: Ideal, here: Problem, event: Event) -> Explained | None:

@@ -54,8 +54,12 @@ def told_of(look: Look, done: list[Trial]) -> list[Trial]:
 
 
 def _simpler(look: Look, trial: Trial, known: set[str]) -> list[Trial]:
-    """Special cases of a trial that are worth telling beside it. known: labels of what is told."""
-    if look.budget.spent():
+    """Special cases of a trial that are worth telling beside it. known: labels of what is told.
+
+    They begin where it ends, a few steps from their own end: a law is not told for want of these, where its
+    own number is none and its device's zero is off.
+    """
+    if look.budget.late():
         return []
     judged = set() if look.far else {t.candidate.label for t in look.tried}
     unknown = [c for c in look.candidates if c.label not in known | judged]
