@@ -80,10 +80,15 @@ def test_the_effect_that_leaves_the_other_one_plain_leads(two_at_once: tuple[Pro
 
     right, wrong = tried("hinge_friction"), tried("hinge_damping")
     left = excess(evaluation)
-    found = leading([wrong, right], left, candidates, mass, lambda stage: None, Budget(), finished)
+    found = leading(
+        [wrong, right], left, candidates, mass, lambda stage: None, Budget(), finished, lambda *_: []
+    )
     assert found is not None
     assert found[0].candidate.effect == "hinge_friction"
     # To first order a cable's length is alike to its hinge
     assert found[1].candidate.effect in ("cable_length", "hinge_position")
     assert misfit(found[1].evaluation) < 1.05
-    assert leading([wrong], left, candidates, mass, lambda stage: None, Budget(), finished) is None
+    assert (
+        leading([wrong], left, candidates, mass, lambda stage: None, Budget(), finished, lambda *_: [])
+        is None
+    )

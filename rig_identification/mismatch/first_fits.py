@@ -6,7 +6,7 @@ not take it all away.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -222,14 +222,16 @@ def leading(
     notify: Notify,
     budget: Budget,
     finish: Callable[[Trial], Trial | None],
+    settling: Callable[[Trial, list[Promise]], Iterable[Promise]],
     refused: int = 0,
     asked: Sequence[Promise] = (),
 ) -> tuple[Trial, Trial] | None:
     """The hypothesis with which, and with one more, nothing is left, and that one; None where there is none.
 
     left: without any of them, nats. finish: fits a trial to its end; None where its sign makes no sense.
-    refused: so many of the first that were tried were asked before, and are not. asked: promises of what rest
-    asks for most, which first order may say little of.
+    settling: of promises beside a trial those that explain rest with it. refused: so many of the first that
+    were tried were asked before, and are not. asked: promises of what rest asks for most, which first order
+    may say little of.
 
     Of two effects at once the one that takes most away alone may be neither: what bends to both does. What
     is left with either of the two shows the other one plainly.
@@ -259,7 +261,8 @@ def leading(
         chiefly = excess(first.evaluation) < ALMOST * left
         possible = {c.label for c in others}
         resting = (p for p in asked if p.candidate.label in possible)
-        for promise in chain(resting, _further(promises, count_of(others), chiefly, budget)):
+        settled = settling(first, promises)
+        for promise in chain(resting, settled, _further(promises, count_of(others), chiefly, budget)):
             second = leaving_nothing(first, promise, budget)
             if second is None:
                 continue

@@ -78,6 +78,7 @@ class Look:
     notify: Notify
     budget: Budget
     alone: Alone = NOTHING
+    led: Trial | None = None  # what led here: with it nothing was left of what the first effect was fitted to
     fitted: Trial | None = None  # before, to ``here`` about ``seen``
     tried: list[Trial] = field(default_factory=list)
     device: str | None = None  # that contradicts all others
@@ -180,7 +181,17 @@ class Look:
             worthy += [p for p in self.promises if p.candidate.label == self.fitted.candidate.label]
         if not self.far and worthy:
             worthy += as_likely(self.promises, worthy, MEANT)
+        if self.led is not None:
+            worthy = [self._promised_by(self.led), *worthy]
         self.begin(worthy)
+
+    def _promised_by(self, led: Trial) -> Promise:
+        """What led here is as good as kept: first order may say little of it, as it did before."""
+        told = next((p for p in self.promises if p.candidate.label == led.candidate.label), None)
+        most = max((p.gain for p in self.promises), default=0.0)
+        named = led.problem.bench.parameters.named(led.evaluation.point.theta)
+        values = {q.name: named[q.name] for q in led.candidate.parameters}
+        return Promise(led.candidate, most, values, share=1.0, charge=None if told is None else told.charge)
 
     def as_measured(self) -> None:
         """What the motion that was measured promises most of, in a rig as it is described.
@@ -457,6 +468,7 @@ class Look:
             self.notify,
             self.budget,
             self.finished,
+            self._settling_beside,
             self.refused,
             self.asked,
         )
@@ -472,6 +484,17 @@ class Look:
         ]
         self.beside[first.candidate.label] = sorted(seconds, key=lambda t: -t.evidence)
         return first
+
+    def _settling_beside(self, first: Trial, promises: list[Promise]) -> list[Promise]:
+        """What explains rest with a first effect in the model, of what is fitted soon and promises as much.
+
+        A model bent to a second error promises all that is left to twenty hypotheses, to a hose of nine
+        numbers first. Rest tells two that both show there from all others.
+        """
+        soon = [p for p in promises if not p.candidate.slow]
+        close = [p.candidate for p in soon if p.gain > CLOSE * soon[0].gain]
+        asked = at_rest(first.problem, first.evaluation, close, self.budget, soon)
+        return [a.promise for a in asked if a.settles][:ALIKE]
 
     def _ringing_beside(self, first: Trial, second: Trial) -> list[Trial]:
         """Ceilings that ring beside a first hypothesis as a part on springs does, and leave nothing."""

@@ -100,6 +100,7 @@ class _Naming:
                 search.budget,
                 more=not self.last,
                 alone=NOTHING if self.step else self._alone(),
+                led=None if known is None else known.done[0],
             )
             if known is not None and not any(map(at_noise, tried.done)):
                 # Time ran out before it was come to again

@@ -60,6 +60,7 @@ def trials(
     budget: Budget = UNLIMITED,
     more: bool = False,
     alone: Alone = NOTHING,
+    led: Trial | None = None,
 ) -> Trials:
     """Full fits of the most promising hypotheses to the pieces that fit worst, most likely first.
 
@@ -69,7 +70,7 @@ def trials(
     tried whatever screening says. Beside a part on springs the ceiling that rings as it does is tried.
     Where the budget is spent nothing more that changes the model is begun. screened: promises about this
     evaluation, where they are known. more: another effect may be added after. alone: what is asked as long as
-    nothing else is in the model.
+    nothing else is in the model. led: what the effect that is in the model was adopted for.
     """
     mass = mass_of(problem, evaluation)
     far = misfit(evaluation) > NEAR_SQUARE
@@ -79,16 +80,16 @@ def trials(
             evaluation = at_minimum(problem, evaluation)
     promises = screened or screen(problem, evaluation, candidates, mass)
     here, seen = (problem, evaluation) if far else worst_pieces(problem, evaluation)
-    led = None
+    two = None
     if more and not far:
-        led = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
+        two = first_of_two(problem, evaluation, promises, count_of(candidates), MEANT, limit, notify, budget)
     look = Look(
-        problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, alone
+        problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, alone, led
     )
-    if led is not None and led.leads:
-        return Trials(told_of(look, [led.first]))
-    if led is not None and here is problem:
-        look.fitted = led.instead or led.first
+    if two is not None and two.leads:
+        return Trials(told_of(look, [two.first]))
+    if two is not None and here is problem:
+        look.fitted = two.instead or two.first
     lead, certain = _from_afar(look, more) if misfit(seen) > VERY_FAR else (None, [])
     if certain:
         return leads(look, certain, asked=True)
