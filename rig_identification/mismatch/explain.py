@@ -171,8 +171,7 @@ def _beside_push(
     calm: Calmed = nothing_known,
 ) -> Explained | None:
     """What explains the session outside a push; None where nothing pushes, or nothing explains the rest."""
-    event = push_beside(here, evaluation, notify, calm)
-    return _beside_event(ideal, here, event, notify, budget, chief=misfit(evaluation) > VERY_FAR)
+    return _beside_event(ideal, here, push_beside(here, evaluation, notify, calm), notify, budget)
 
 
 def _beside_event(
