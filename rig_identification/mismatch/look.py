@@ -277,7 +277,7 @@ class Look:
         if not any(a.settles for a in at_rest(self.here, self.seen, heavy, self.budget)):
             return
         self.notify("what rest asks for")
-        most = max(a.promise.gain for a in self._hanging)
+        most = max((a.promise.gain for a in self._hanging), default=0.0)
         settled = [a for a in self._hanging if a.settles and a.promise.gain > most - BEATEN]
         if most < BEATEN or not settled or not all(acts(a.promise.candidate) for a in settled):
             return
