@@ -187,11 +187,10 @@ class Look:
 
     def _promised_by(self, led: Trial) -> Promise:
         """What led here is as good as kept: first order may say little of it, as it did before."""
-        told = next((p for p in self.promises if p.candidate.label == led.candidate.label), None)
         most = max((p.gain for p in self.promises), default=0.0)
         named = led.problem.bench.parameters.named(led.evaluation.point.theta)
         values = {q.name: named[q.name] for q in led.candidate.parameters}
-        return Promise(led.candidate, most, values, share=1.0, charge=None if told is None else told.charge)
+        return Promise(led.candidate, most, values, share=1.0)
 
     def as_measured(self) -> None:
         """What the motion that was measured promises most of, in a rig as it is described.
@@ -485,16 +484,17 @@ class Look:
         self.beside[first.candidate.label] = sorted(seconds, key=lambda t: -t.evidence)
         return first
 
-    def _settling_beside(self, first: Trial, promises: list[Promise]) -> list[Promise]:
+    def _settling_beside(self, first: Trial, promises: list[Promise]) -> Iterator[Promise]:
         """What explains rest with a first effect in the model, of what is fitted soon and promises as much.
 
         A model bent to a second error promises all that is left to twenty hypotheses, to a hose of nine
-        numbers first. Rest tells two that both show there from all others.
+        numbers first. Rest tells two that both show there from all others; it takes some seconds, and is
+        asked once nothing before it leaves nothing.
         """
         soon = [p for p in promises if not p.candidate.slow]
         close = [p.candidate for p in soon if p.gain > CLOSE * soon[0].gain]
         asked = at_rest(first.problem, first.evaluation, close, self.budget, soon)
-        return [a.promise for a in asked if a.settles][:ALIKE]
+        yield from [a.promise for a in asked if a.settles][:ALIKE]
 
     def _ringing_beside(self, first: Trial, second: Trial) -> list[Trial]:
         """Ceilings that ring beside a first hypothesis as a part on springs does, and leave nothing."""

@@ -109,8 +109,8 @@ def ended(look: Look) -> Trials:
     return Trials(
         told,
         look.device,
-        tuple(map(among_places, beaten)),
-        tuple(map(among_places, unsure)),
+        beaten=tuple(map(among_places, beaten)),
+        unsure=tuple(map(among_places, unsure)),
         chief=chief,
         left=look.left,
     )
