@@ -240,19 +240,20 @@ class Look:
         return self._beside_each([t for t in map(self.finished, fewest) if t is not None])
 
     def outright(self) -> None:
-        """What swings and promises nearly all, and cables that stretch where a stiffness takes that away.
+        """What swings and promises most, a hose that promises nearly all, and cables that stretch.
 
         A hose bends to an error of one length or hinge, which promises as much with one number of its own.
+        What swings near the exciter's frequencies promises a tenth to first order and leaves nothing once it
+        is fitted, in seconds; one that did not is tried again from where nothing is bent. Cables that
+        stretch are tried where a stiffness takes nearly all away.
         """
-        promised = [
-            p
-            for p in self.promises[:1]
-            if p.candidate.slow and p.share > DIRECT and self.soon < CLOSE * p.gain
-        ]
+        ahead = [p for p in self.promises[:1] if p.candidate.slow and self.soon < CLOSE * p.gain]
+        promised = [p for p in ahead if p.share > DIRECT]
+        swings = [p for p in ahead if p.share <= DIRECT and p.candidate.build is not None]
         self.notify("cables that stretch")
         stretched = stretching(self.here, self.seen, self.mass)
         promised += [] if stretched is None or stretched.share < DIRECT else [stretched]
-        self.begin(promised)
+        self.begin(promised + swings)
         self.ringing()
         self.hopeless = {p.candidate.label for p in self.untried(promised)} if not self.at_noise else set()
 
@@ -286,6 +287,22 @@ class Look:
         if not self.enough:
             ended = [self.finished(t) for t in list(self.tried) if t.candidate.label in self.weighed]
             self.certain = self._beside_each([t for t in ended if t is not None])
+
+    def as_it_hangs(self) -> None:
+        """What alone explains rest, where what promises most is fitted slowly.
+
+        A hose's stiffnesses bend to a hinge that is off, and their fit takes a minute; equilibrium tells in
+        seconds.
+        """
+        if self.alone.measured is None or not self.promises or not self.promises[0].candidate.slow:
+            return
+        self.notify("what rest asks for")
+        most = max((a.promise.gain for a in self._hanging), default=0.0)
+        for found in self._hanging:
+            if most < BEATEN or self.budget.spent():
+                break
+            if found.settles and most - found.promise.gain < BEATEN:
+                self._fit_as_it_hangs(found)
 
     @cached_property
     def _hanging(self) -> list[AtRest]:

@@ -93,6 +93,8 @@ def trials(
     lead, certain = _from_afar(look, more) if misfit(seen) > VERY_FAR else (None, [])
     if certain:
         return leads(look, certain, asked=True)
+    if far and misfit(seen) <= VERY_FAR:
+        look.as_it_hangs()
     if lead is None and more:
         lead = look.leading()
     if lead is None and not look.enough and (not far or (promises and promises[0].share > DIRECT)):
