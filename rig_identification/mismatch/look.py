@@ -277,9 +277,8 @@ class Look:
         if not any(a.settles for a in at_rest(self.here, self.seen, heavy, self.budget)):
             return
         self.notify("what rest asks for")
-        most = max((a.promise.gain for a in self._hanging), default=0.0)
-        settled = [a for a in self._hanging if a.settles and a.promise.gain > most - BEATEN]
-        if most < BEATEN or not settled or not all(acts(a.promise.candidate) for a in settled):
+        settled = self._settling()
+        if not settled or not all(acts(a.promise.candidate) for a in settled):
             return
         for found in settled:
             self._fit_as_it_hangs(found)
@@ -297,12 +296,17 @@ class Look:
         if self.alone.measured is None or not self.promises or not self.promises[0].candidate.slow:
             return
         self.notify("what rest asks for")
-        most = max((a.promise.gain for a in self._hanging), default=0.0)
-        for found in self._hanging:
-            if most < BEATEN or self.budget.spent():
+        for found in self._settling():
+            if self.budget.spent():
                 break
-            if found.settles and most - found.promise.gain < BEATEN:
-                self._fit_as_it_hangs(found)
+            self._fit_as_it_hangs(found)
+
+    def _settling(self) -> list[AtRest]:
+        """Of what rest asks for beyond doubt what explains it alone, about as well as any."""
+        most = max((a.promise.gain for a in self._hanging), default=0.0)
+        if most < BEATEN:
+            return []
+        return [a for a in self._hanging if a.settles and a.promise.gain > most - BEATEN]
 
     @cached_property
     def _hanging(self) -> list[AtRest]:
