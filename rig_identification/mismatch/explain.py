@@ -86,8 +86,11 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     return undecided(ideal, problem, fitted.evaluation, promises, count, notify, budget)
 
 
-def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
-    """The search, on runs in which every cable pulls."""
+def _explain(ideal: Ideal, notify: Notify, budget: Budget, *, part: bool = False) -> Explained | None:
+    """The search, on runs in which every cable pulls.
+
+    part: these are what an event leaves of them; None then also where they are not explained.
+    """
     if ideal.mismatch.verdict == "none":
         return None
     fitted = ideal.fitted
@@ -113,7 +116,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         calm = cache(partial(calm_pieces, here, evaluation))
         pushed = without_push(ideal, problem, here, evaluation, pulse, notify, calm)
         pushed = pushed or _beside_push(ideal, here, evaluation, notify, budget, calm)
-        if pushed is None and very_far:
+        if pushed is None and very_far and not budget.spent():
             pushed = _beside_event(ideal, here, burst(here, evaluation), notify, budget, chief=True)
         if pushed is not None:
             return pushed
@@ -140,7 +143,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
         pushed = _gentle_push(ideal, problem, pulse, notify)
         if pushed is not None:
             return pushed
-    return unexplained(ideal, search, best, notify)
+    return None if part else unexplained(ideal, search, best, notify)
 
 
 def _pulsed(
@@ -184,7 +187,7 @@ def _beside_event(
     if event is None:
         return None
     rest = outside_of_event(ideal, event, notify, chief=chief)
-    found = None if rest is None else _explain(rest, notify, budget)
+    found = None if rest is None else _explain(rest, notify, budget, part=True)
     if found is None or not found.told:
         return None
     return with_push(found, ideal, here, event)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from rig_identification.estimate.fitted import Fitted
@@ -15,7 +15,7 @@ from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.first_fits import NO_STAND_IN, shows
 from rig_identification.mismatch.locate import DRIVE
-from rig_identification.mismatch.loose import loose_finding
+from rig_identification.mismatch.something_loose import loose_finding
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search, short_pieces
 from rig_identification.mismatch.trial import Trial, mass_of
 from rig_identification.mismatch.unknown import unknown_finding
@@ -57,8 +57,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
             here, evaluation = pieces[0], pieces[1] or evaluation
     # What knocks at the body moves all witnesses: where all but one device agree, nothing does
     knocks = search.liar in (None, DRIVE)
-    bases: list[_Base] = [] if nearly_all else [((), ideal.fitted)]
-    bases += [] if best is None else [(best.mismatch.findings, best.fitted)]
+    bases = _bases(ideal, search, best, alone=not nearly_all)
     loose = _something_loose(bases, ideal.scores.holdout, search, notify) if knocks else None
     if loose is not None:
         kept, fitted = loose
@@ -90,8 +89,22 @@ def _next_to_none(ideal: Ideal, best: Explained, found: list[Trial]) -> bool:
     return excess(best.fitted.evaluation) < NO_STAND_IN * excess(ideal.fitted.evaluation)
 
 
+def _bases(ideal: Ideal, search: Search, best: Explained | None, *, alone: bool) -> Iterator[_Base]:
+    """The fits that something loose is looked for beside.
+
+    First the ideal model, if it may be ``alone``; then what was found, though it does not convince by itself:
+    an effect of the motion in which blows are left over takes no share of them away.
+    """
+    if alone:
+        yield (), ideal.fitted
+    if best is None and search.found and not search.budget.late():
+        best = whole_runs(ideal, search)
+    if best is not None:
+        yield best.mismatch.findings, best.fitted
+
+
 def _something_loose(
-    bases: list[_Base], before: float | None, search: Search, notify: Notify
+    bases: Iterable[_Base], before: float | None, search: Search, notify: Notify
 ) -> _Base | None:
     """What is told, and the fit it is told beside, where the session has something loose; None: it has not.
 
@@ -99,10 +112,8 @@ def _something_loose(
     what was found. before: held-out error of the ideal model.
     """
     for others, fitted in bases:
-        if search.budget.late():
-            break
         notify("search: something loose", 0.9)
-        found = loose_finding(fitted, before)
+        found = loose_finding(fitted, before, scan=not search.budget.late())
         if found is not None:
             return (*others, found), fitted
     return None

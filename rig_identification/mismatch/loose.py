@@ -17,29 +17,22 @@ catalogue, and in runs that were held out it does so again, with the same travel
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize
 
-from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.side_by_side import side_by_side
-from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.beyond import Beyond
-from rig_identification.mismatch.findings import written
-from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.measured import measured
 from rig_identification.mismatch.response import instant_information, whitened_response
-from rig_identification.mismatch.rider_places import REACH, spread_of
-from rig_identification.mismatch.riders import middle_of
-from rig_identification.mismatch.screen import free_without, screen, with_reference
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.rider_places import REACH
+from rig_identification.mismatch.screen import free_without
 from rig_identification.model import layout
 from rig_identification.model.motion import Motion
-from rig_identification.result import Finding
 
 Array = NDArray[np.float64]
 
@@ -58,13 +51,8 @@ STARTS, POLISHED = 6, (250, 250)
 ALIKE = np.array([0.25, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0])
 #: First steps of the simplex: in the logarithms, and in the place.
 NUDGES = (0.03, 0.2, 0.3, 0.3, 0.15, 0.15, 0.15)
-#: Std of a travel that blows were timed by, and of a mass that they tell, as a share of each: blows that come
-#: some milliseconds early or late in the scan make a part look lighter, and its way longer or shorter.
-TIMED, WEIGHED = 0.5, 1.0
-#: Nats by which a loose part has to be likelier than all else, and by which held-out runs have to confirm it.
-AHEAD, CONFIRMED = 30.0, 10.0
-#: Share of that below which the scan's best is not followed any further.
-FAINT = 0.25
+#: Nats below which the scan's best is not followed any further.
+FAINT = 7.5
 #: Share of its travel to which a part has come that left its stop.
 LEFT = 0.99
 #: Prior std of its mass, in parts of the body's, and the number of them past which it is no part of the body.
@@ -311,7 +299,7 @@ def likeliest(along: Along, middle: Array, spread: float) -> tuple[Loose, Gain]:
     for seed in SEEDS:
         every += [g for found in side_by_side(scanned, [(axis, seed) for axis in AXES]) for g in found]
         best = min(every, key=lambda g: g.left)
-        if -best.left < FAINT * AHEAD:
+        if -best.left < FAINT:
             # Nothing looks like it at all: no simplex makes so much of that
             chosen = part(best.axis, best.x)
             return chosen, along.gain(chosen)
@@ -336,65 +324,3 @@ class _Guess:
     def like(self, other: _Guess) -> bool:
         """Whether a simplex from either would look at much the same."""
         return self.axis == other.axis and bool(np.all(np.abs(self.x - other.x) < ALIKE))
-
-
-def loose_finding(fitted: Fitted, before: float | None) -> Finding | None:
-    """What is told of a loose part beside a fit that leaves something; None: there is none that convinces.
-
-    fitted: whole runs, each from rest. before: held-out error of the ideal model.
-    """
-    problem, point = with_reference(fitted.problem, fitted.rest), fitted.evaluation.point
-    mass = mass_of(problem, fitted.evaluation)
-    seen = measured(problem, point, mass)
-    if seen is None:
-        return None
-    along = Along(*seen, mass)
-    part, gain = likeliest(along, middle_of(problem.bench.rig), spread_of(problem))
-    likely = gain.nats > AHEAD and any(part.leaves_its_stop(run.motion) for run in seen[1].runs)
-    held = _held_out(fitted, problem, mass) if likely else None
-    again = None if held is None else held.gain(part)
-    if again is None or again.nats < CONFIRMED:
-        return None
-    rivals = screen(*seen, catalogue(problem), mass)
-    if rivals and gain.nats < rivals[0].gain + AHEAD:
-        return None
-    between = any(part.to_either_side(run.motion) for run in seen[1].runs)
-    return _told(part, between, gain, again, before)
-
-
-def _held_out(fitted: Fitted, problem: Problem, mass: float) -> Along | None:
-    """Held-out runs about their measured motion; None where there is none that can be followed."""
-    if not fitted.holdouts:
-        return None
-    point = fitted.evaluation.point
-    held = replace(problem, runs=fitted.holdout_runs, rests=())
-    starts = tuple(run.motion.state(0) for run in fitted.holdouts)
-    seen = measured(held, Point(point.theta, starts, ()), mass)
-    return None if seen is None else Along(*seen, mass, fixed=True)
-
-
-def _told(part: Loose, between: bool, gain: Gain, again: Gain, before: float | None) -> Finding:
-    """The finding in words and numbers.
-
-    between: it hits both stops. again: the gain in held-out runs, which tell the mass once more.
-    """
-    std = max(float(np.hypot(gain.std, gain.mass - again.mass)), WEIGHED * gain.mass)
-    quantities = {"mass": (gain.mass, std, "kg")}
-    stops = "a stop"
-    if between:
-        quantities["travel"] = part.travel, TIMED * part.travel, "m"
-        stops = f"its stops {1e3 * part.travel:.0f} mm to either side"
-    told = f"{gain.mass:.2g} kg of it or more (± {std:.2g} kg; blows timed a little off make it look lighter)"
-    text = (
-        f"Something slides along {part.axis} and hits {stops}: "
-        f"about {told}. Nothing else of the catalogue takes as much of the missing wrench away, and where "
-        f"nothing was fitted it does so too ({gain.nats:.0f} and {again.nats:.0f} nats). The blows "
-        "themselves are not followed to the noise. Find it by ear, and fix it or take it out."
-    )
-    where: dict[str, object] = {"channel": None, "axis": part.axis, "position": [float(v) for v in part.at]}
-    evidence: dict[str, float | None] = {
-        "log_likelihood_gain": gain.nats,
-        "holdout_error_before": before,
-        "holdout_error_after": None,
-    }
-    return Finding("loose_mass", where, written(quantities), evidence, text)

@@ -106,13 +106,12 @@ def trials(
         ahead = look.giving_way_beside()
         if ahead:
             return leads(look, ahead, asked=True)
-    if far and not look.enough:
-        look.without_devices()
-    if far and not look.enough:
-        look.giving_way()
+    for witness in (look.without_devices, look.giving_way):
+        if far and not look.enough and not look.budget.spent():
+            witness()
     if look.lawful is not None:
         return Trials([], lawful=look.lawful)
-    if not far and not _without_support(look.tried, seen):
+    if not far and not _without_support(look.tried, seen) and not look.budget.spent():
         look.yielding_a_little()
     elif not gives_way(problem.bench.parameters.model):
         look.ringing()
@@ -129,6 +128,8 @@ def _from_afar(look: Look, more: bool) -> tuple[Trial | None, list[Trial]]:
     once whether with one more it leaves nothing.
     """
     for witness in (look.as_weighed, look.as_measured, look.slowly_as_measured, look.outright):
+        if look.budget.spent():
+            return None, []
         witness()
         if more and look.certain:
             return None, look.certain

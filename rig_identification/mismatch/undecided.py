@@ -131,7 +131,7 @@ def _neither_shown_nor_excluded(
     close = [p for p in known if trails_anywhere(p) < TIED]
     stated: list[tuple[float, Trial]] = []
     for promise in sorted(close, key=trails_anywhere)[:ASKED]:
-        if len(stated) == STATED:
+        if len(stated) == STATED or budget.spent():
             break
         if any(t.candidate.kind == promise.candidate.kind for _, t in stated):
             # Its other places are its rivals anyway

@@ -1,0 +1,385 @@
+"""Something loose that knocks: blows along one line, each of which comes when the last one says.
+
+What slides between stops hits them, and a blow lasts some milliseconds. In the random wrench that stands for
+what the model lacks along the measured motion (measured.py) it is a spike of one node or two, which nothing
+smooth bends to, be the model wrong in something else as well. Of spikes z_k (6), whitened by what the
+recordings tell of one interval's wrench and by their own spread,
+    z_k = S a_k (d, p x d) + noise
+is one line of action: direction d through p, impulse a_k. What knocks has that line in every run.
+
+From one blow to the next the part slides, massless, along the measured motion. Its way y from the stop that
+it hit last, sigma = sign(a_k), begins with what that blow left of its speed:
+    y'' = sigma (f + b) - c y',  y(0) = 0,  y'(0) = kappa |a_k|,  y >= 0,  f = d . f_a(p)
+f_a: specific force; b: slope of its floor, m/s^2. At the next blow y = 0, or 2 l where the other stop is hit;
+and that blow's impulse is what stops it: |a_k+1| = m (1 + e) |y'|, e = kappa m (1 + e). A scan of whole runs
+(loose.py) has to have all blows right, each of which follows from the ones before; here every blow begins
+anew, and errors of some milliseconds do not grow.
+
+How much likelier (nats) that makes the times and sizes of blows than chance does: the times are Cauchy with
+the scale that they show, about the one that is predicted, against any time within the mean gap; the log
+sizes likewise, against their own spread. Half the log of the number of gaps is charged for each number that
+is looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.optimize import differential_evolution
+from scipy.stats import chi2
+
+from rig_identification.estimate.parameters import AXES
+from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.amounts import CHIEF
+from rig_identification.mismatch.response import instant_information
+from rig_identification.model import layout
+from rig_identification.model.motion import Motion
+
+Array = NDArray[np.float64]
+
+RATE, FORCE, ALPHA = layout.OUT_RATE, layout.OUT_SPECIFIC_FORCE, layout.OUT_ANGULAR_ACCELERATION
+#: What lasts longer than this (s) is no blow; blows closer than the other are one.
+SMOOTH, APART = 0.2, 0.03
+#: Chance of a spike in a run that has none, and the number of its spread's std up to which a node has none.
+CHANCE, CALM = 1e-3, 3.0
+#: Median of a normal error's size, in std.
+NORMAL = 0.6745
+#: Share of the mean variance that is added to each direction's: one in which nothing is asked has none.
+EVEN = 1e-9
+#: Least number of blows along one line, and least share of the largest that a blow has.
+FEWEST, FAINTEST = 4, 0.05
+#: Integration steps between two nodes.
+FINE = 8
+#: Ends of what is looked at: rate 1/s, speed after a middling blow m/s, slope m/s^2; and its prior's std.
+RATES, SPEEDS, SLOPES, SLOPING = (0.05, 8.0), (1e-4, 0.1), (-0.3, 0.3), 0.1
+#: Differential evolution: members for each number, generations.
+PEOPLE, GENERATIONS = 12, 40
+#: m/s below which a part does not come, and what such a blow's time (s) and log size are taken to be off by.
+STILL, NEVER, NOTHING_LIKE = 1e-4, 1.0, 3.0
+#: Least scales of times (s) and log sizes.
+SHARPEST, ALIKE = 0.005, 0.05
+#: Numbers that are looked for: rate, rebound, slope, travel, weight, and the two scales.
+NUMBERS = 7
+
+
+@dataclass(frozen=True)
+class Spikes:
+    """What stands out of the random wrench of one run."""
+
+    motion: Motion
+    nodes: NDArray[np.int64]  # (K,)
+    whitened: Array  # (K, 6)
+    seen: Array  # (6, 6): from a wrench held for one node interval to what it whitens to
+
+
+def spikes_of(problem: Problem, evaluation: Evaluation) -> list[Spikes]:
+    """Spikes of every run about its measured motion (measured.py).
+
+    Raises:
+        ValueError: the problem has no random wrench.
+    """
+    if problem.extra_noise is None:
+        raise ValueError("there is no random wrench that blows could stand out of")
+    weight = 1.0 / np.diag(problem.extra_noise)
+    out = []
+    for run, latent in zip(evaluation.runs, evaluation.point.latents, strict=True):
+        if latent is None:
+            continue
+        step = run.motion.step
+        pull = latent * weight
+        pull = pull - median_filter(pull, size=(int(SMOOTH / step) | 1, 1), mode="nearest")
+        root = np.linalg.cholesky(instant_information(run))
+        alone = np.linalg.solve(root, pull.T).T
+        spread = np.median(np.abs(alone), axis=0) / NORMAL
+        calm = alone[np.all(np.abs(alone) <= CALM * spread, axis=1)]
+        own = np.linalg.cholesky(np.cov(calm.T) + EVEN * np.mean(spread**2) * np.eye(6))
+        white = np.linalg.solve(own, alone.T).T
+        nodes, sums = _together(white, max(1, round(APART / step)))
+        out.append(Spikes(run.motion, nodes, sums, np.linalg.solve(own, root.T)))
+    return out
+
+
+def _together(white: Array, apart: int) -> tuple[NDArray[np.int64], Array]:
+    """Nodes at which blows are largest, and their whitened sums (K, 6)."""
+    size = np.sum(white**2, axis=1)
+    high = np.flatnonzero(size > chi2.isf(CHANCE / size.size, 6))
+    groups = np.split(high, np.flatnonzero(np.diff(high) > apart) + 1) if high.size else []
+    nodes = [g[np.argmax(size[g])] for g in groups]
+    sums = [np.sum(white[max(g[0] - 1, 0) : g[-1] + 2], axis=0) for g in groups]
+    return np.array(nodes, dtype=np.int64), np.array(sums).reshape(-1, 6)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of action in the body."""
+
+    along: Array  # (3,) unit
+    at: Array  # (3,) m, its point next to the datum
+
+    @property
+    def axis(self) -> str:
+        """The body's axis that it is nearest to."""
+        return AXES[int(np.argmax(np.abs(self.along)))]
+
+    @property
+    def wrench(self) -> Array:
+        """(6,) of a newton along it."""
+        return np.concatenate([self.along, np.cross(self.at, self.along)])
+
+    def impulses(self, spikes: Spikes) -> Array:
+        """(K,) N s along it."""
+        row = spikes.seen @ self.wrench
+        return np.asarray(spikes.whitened @ row / (row @ row) * spikes.motion.step)
+
+    def own(self, spikes: Spikes) -> Array:
+        """(K,) of each spike's square what is along it."""
+        row = spikes.seen @ self.wrench
+        return np.asarray((spikes.whitened @ row) ** 2 / (row @ row))
+
+    def chiefly(self, spikes: Spikes) -> NDArray[np.bool_]:
+        """(K,) which spikes are along it for the larger part."""
+        return np.asarray(self.own(spikes) > CHIEF * np.sum(spikes.whitened**2, axis=1))
+
+    def share(self, every: Sequence[Spikes]) -> float:
+        """Share of all spikes' squares that is along it."""
+        total = sum(float(np.sum(s.whitened**2)) for s in every)
+        return sum(float(np.sum(self.own(s))) for s in every) / max(total, 1e-300)
+
+
+def lines_of(every: Sequence[Spikes]) -> list[Line]:
+    """The line along which spikes come: along the body's axis that is nearest, and as it is measured."""
+    if sum(s.nodes.size for s in every) < FEWEST:
+        return []
+    frame = every[0].seen
+    rows = np.vstack([s.whitened @ np.linalg.solve(s.seen, np.eye(6)).T @ frame.T for s in every])
+    wrench = np.linalg.solve(frame, np.linalg.svd(rows, full_matrices=False)[2][0])
+    force = float(np.linalg.norm(wrench[:3]))
+    if force == 0.0:
+        return []
+    along, moment = wrench[:3] / force, wrench[3:] / force
+    along, moment = (-along, -moment) if along[np.argmax(np.abs(along))] < 0.0 else (along, moment)
+    axis = np.eye(3)[int(np.argmax(np.abs(along)))]
+    return [Line(axis, np.cross(axis, moment)), Line(along, np.cross(along, moment))]
+
+
+@njit(cache=True, nogil=True)
+def _flights(force, first, last, side, speed, step, rate, slope, out):  # type: ignore[no-untyped-def]
+    """out (G, 2): way (m) from the stop that was left and its rate at the end of each gap.
+
+    A part that has come back already is beyond the stop by what it would have gone since.
+    """
+    for g in range(first.shape[0]):
+        h = step[g] / FINE
+        y, v = 0.0, speed[g]
+        since, hit = 0.0, 0.0
+        for k in range(first[g], last[g]):
+            for s in range(FINE):
+                f = force[k] + (force[k + 1] - force[k]) * (s + 0.5) / FINE + slope
+                away = y > 0.0
+                v += h * (side[g] * f - rate * v)
+                y += h * v
+                since += h
+                if y < 0.0:
+                    if away:
+                        hit, since = -v, 0.0
+                    y, v = 0.0, 0.0
+        if y > 0.0:
+            out[g, 0], out[g, 1] = y, v
+        else:
+            out[g, 0], out[g, 1] = -hit * since, -hit
+
+
+class Gaps:
+    """What lies between blows along a line, run after run."""
+
+    def __init__(self, line: Line, every: Sequence[Spikes]) -> None:
+        self.line = line
+        force, first, last, step, before, after = [], [], [], [], [], []
+        begun = 0
+        for spikes in every:
+            impulses = line.impulses(spikes)
+            most = np.max(np.abs(impulses), initial=0.0)
+            kept = np.flatnonzero(line.chiefly(spikes) & (np.abs(impulses) > FAINTEST * most))
+            force.append(_felt(spikes.motion, line))
+            first += [begun + int(n) for n in spikes.nodes[kept[:-1]]]
+            last += [begun + int(n) for n in spikes.nodes[kept[1:]]]
+            before += list(impulses[kept[:-1]])
+            after += list(impulses[kept[1:]])
+            step += [spikes.motion.step] * max(kept.size - 1, 0)
+            begun += force[-1].size
+        self._force = np.concatenate(force) if force else np.zeros(0)
+        self._first, self._last = np.array(first, dtype=np.int64), np.array(last, dtype=np.int64)
+        self._step = np.array(step, dtype=float)
+        self.before, self.after = np.array(before, dtype=float), np.array(after, dtype=float)
+        self.same = np.sign(self.before) == np.sign(self.after)
+
+    @property
+    def count(self) -> int:
+        """Number of gaps."""
+        return int(self.after.size)
+
+    @property
+    def mean(self) -> float:
+        """Mean length, s."""
+        return float(np.mean((self._last - self._first) * self._step))
+
+    def weight(self, slide: Slide) -> float | None:
+        """Impulse of a blow over the speed at which the part comes, kg; None where it comes to none."""
+        speed = self.arrivals(slide)[1]
+        coming = speed > STILL
+        if not np.any(coming):
+            return None
+        return float(np.exp(np.median(np.log(np.abs(self.after[coming]) / speed[coming]))))
+
+    def arrivals(self, slide: Slide) -> tuple[Array, Array]:
+        """Way (m) from the stop that was left, and speed (m/s) towards the stop that is hit, (G,) each."""
+        out = np.empty((self.count, 2))
+        speed = slide.left * np.abs(self.before)
+        side = np.sign(self.before)
+        _flights(self._force, self._first, self._last, side, speed, self._step, slide.rate, slide.slope, out)
+        return out[:, 0], np.where(self.same, -out[:, 1], out[:, 1])
+
+
+def _felt(motion: Motion, line: Line) -> Array:
+    """(N,) specific force along a line of the body."""
+    out = motion.outputs
+    turning = out[:, RATE : RATE + 3]
+    there = (
+        out[:, FORCE : FORCE + 3]
+        + np.cross(out[:, ALPHA : ALPHA + 3], line.at)
+        + np.cross(turning, np.cross(turning, line.at))
+    )
+    return np.ascontiguousarray(there @ line.along)
+
+
+@dataclass(frozen=True)
+class Slide:
+    """How a part slides and rebounds."""
+
+    rate: float  # 1/s: what slows it
+    left: float  # m/s after a blow of one N s
+    slope: float  # m/s^2, of its floor
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """How well times and sizes of blows follow from the ones before."""
+
+    slide: Slide
+    apart: float  # m between the stops; NaN where one alone is hit
+    weight: float  # kg: impulse of a blow over speed, m (1 + e)
+    late: float  # s, scale of times
+    unlike: float  # scale of log sizes
+    nats: float  # by which that is likelier than chance, nothing charged
+
+
+def _arrival(gaps: Gaps, slide: Slide, known: Arrival | None = None) -> Arrival:
+    """Times and sizes with a slide. known: with distance, weight and scales of other runs."""
+    way, speed = gaps.arrivals(slide)
+    across = way[~gaps.same]
+    if known is None:
+        apart = float(np.median(across)) if across.size else float("nan")
+        weight = gaps.weight(slide) or 1.0
+    else:
+        apart, weight = known.apart, known.weight
+    short, fast = np.where(gaps.same, way, way - apart), np.maximum(speed, STILL)
+    told = (speed > STILL) & np.isfinite(short)
+    size = np.log(np.abs(gaps.after))
+    times = np.where(told, np.abs(short) / fast, NEVER)
+    off = np.where(told, np.abs(size - np.log(weight * fast)), NOTHING_LIKE)
+    about = np.abs(size - np.median(size))
+    late, unlike, wide = (
+        max(float(np.median(a)), b) for a, b in ((times, SHARPEST), (off, ALIKE), (about, ALIKE))
+    )
+    if known is not None:
+        late, unlike = known.late, known.unlike
+    timed = np.log(gaps.mean) - _cauchy(times, late) - np.log(np.pi)
+    sized = _cauchy(about, wide) - _cauchy(off, unlike)
+    return Arrival(slide, apart, weight, late, unlike, float(np.sum(timed + sized)))
+
+
+def _cauchy(error: Array, scale: float) -> Array:
+    """Nats that an error costs, but for the log of pi."""
+    return np.asarray(np.log1p((error / scale) ** 2) + np.log(scale))
+
+
+def _likeliest(gaps: Gaps) -> Arrival:
+    middling = float(np.median(np.abs(gaps.before)))
+    bounds = [
+        (float(np.log(RATES[0])), float(np.log(RATES[1]))),
+        (float(np.log(SPEEDS[0] / middling)), float(np.log(SPEEDS[1] / middling))),
+        SLOPES,
+    ]
+
+    def with_(x: Array) -> Arrival:
+        return _arrival(gaps, Slide(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2])))
+
+    def unlikely(x: Array) -> float:
+        return 0.5 * float(x[2] / SLOPING) ** 2 - with_(x).nats
+
+    found = differential_evolution(
+        unlikely, bounds, popsize=PEOPLE, maxiter=GENERATIONS, seed=1, polish=False
+    )
+    return with_(found.x)
+
+
+@dataclass(frozen=True)
+class Knocks:
+    """A part that knocks, as its blows tell it."""
+
+    line: Line
+    blows: int  # along it, in all runs
+    mass: float  # kg
+    std: float  # kg
+    travel: float | None  # m either side; None where it hits one stop alone
+    travel_std: float
+    gain: float  # nats that its line takes away, and does in held-out runs
+    again: float
+    timed: float  # nats by which its slide tells times and sizes of all blows
+    confirmed: float  # ... of those that it was not made for
+
+
+def knocking(seen: tuple[Problem, Evaluation], held: tuple[Problem, Evaluation]) -> Knocks | None:
+    """What knocks along one line in fitted and in held-out runs, the likelier of two; None: nothing does.
+
+    seen, held: about their measured motion. Whether the blows' times convince is in ``timed`` and
+    ``confirmed``: a slide is made for those of the runs that have more, and confirmed by the others.
+    """
+    return knocking_in(spikes_of(*seen), spikes_of(*held))
+
+
+def knocking_in(fitted: list[Spikes], held: list[Spikes]) -> Knocks | None:
+    """The same, of spikes that are known."""
+    found = [_knocks(line, fitted, held) for line in lines_of([*fitted, *held])]
+    return max((k for k in found if k is not None), key=lambda k: k.timed, default=None)
+
+
+def _knocks(line: Line, fitted: list[Spikes], held: list[Spikes]) -> Knocks | None:
+    if min(line.share(fitted), line.share(held)) < CHIEF:
+        return None
+    gaps, others = sorted((Gaps(line, fitted), Gaps(line, held)), key=lambda g: -g.count)
+    if gaps.count < FEWEST or not others.count:
+        return None
+    arrival = _likeliest(gaps)
+    confirmed = _arrival(others, arrival.slide, arrival).nats
+    mass = arrival.weight / (1.0 + arrival.slide.left * arrival.weight)
+    weight = others.weight(arrival.slide)
+    apart = 0.0 if weight is None else float(np.log(weight / arrival.weight))
+    across = gaps.arrivals(arrival.slide)[0][~gaps.same]
+    return Knocks(
+        line,
+        sum(int(np.sum(line.chiefly(s))) for s in (*fitted, *held)),
+        mass,
+        mass * float(np.hypot(arrival.unlike / NORMAL, apart)),
+        0.5 * arrival.apart if across.size else None,
+        0.5 * float(np.median(np.abs(across - arrival.apart))) / NORMAL if across.size else 0.0,
+        0.5 * sum(float(np.sum(line.own(s))) for s in fitted),
+        0.5 * sum(float(np.sum(line.own(s))) for s in held),
+        arrival.nats - 0.5 * NUMBERS * float(np.log(gaps.count)) + confirmed,
+        confirmed,
+    )
