@@ -61,7 +61,9 @@ class Search:
         self.bodies = ()
         if self.whole:
             self.bodies = tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in others)
-        self.here, self.evaluation = adopted(self.here, self.evaluation, chosen, in_passing=in_passing)
+        self.here, self.evaluation = adopted(
+            self.here, self.evaluation, chosen, in_passing=in_passing, budget=self.budget
+        )
 
 
 def short_pieces(ideal: Ideal) -> tuple[Problem, Evaluation | None] | None:

@@ -108,11 +108,17 @@ def earned_evidence(problem: Problem, before: Evaluation, after: Evaluation, *, 
 
 
 def adopted(
-    problem: Problem, evaluation: Evaluation, trial: Trial, *, in_passing: bool = False
+    problem: Problem,
+    evaluation: Evaluation,
+    trial: Trial,
+    *,
+    in_passing: bool = False,
+    budget: Budget = UNLIMITED,
 ) -> tuple[Problem, Evaluation]:
     """A trial's effect in the model of all pieces, fitted.
 
-    in_passing: what it leads to is known and comes next; nothing is fitted without that.
+    in_passing: what it leads to is known and comes next; nothing is fitted without that. Where it is late the
+    fit stays where it is.
     """
     wide = extended(problem, (trial.candidate,))
     if len(wide.runs) == len(trial.problem.runs):
@@ -142,7 +148,7 @@ def adopted(
     if there is not None and misfit(there) < AGREED:
         # Pieces that it was not fitted to agree: whole runs are next, and fitting these all tells no more
         return wide, there
-    fitted, _ = solve(wide, point, iterations=6, tolerance=0.5)
+    fitted, _ = solve(wide, point, iterations=6, tolerance=0.5, stop=budget.late)
     return wide, fitted
 
 
