@@ -16,15 +16,15 @@ and that blow's impulse is what stops it: |a_k+1| = m (1 + e) |y'|, e = kappa m 
 anew, and errors of some milliseconds do not grow.
 
 How much likelier (nats) that makes the times and sizes of blows than chance does: the times are Cauchy with
-the scale that they show, about the one that is predicted, against any time within the mean gap; the log
-sizes likewise, against their own spread. Half the log of the number of gaps is charged for each number that
-is looked for.
+the scale that they show, about the one that is predicted, against blows that come at any time, as many; the
+log sizes likewise, against their own spread. Half the log of the number of gaps is charged for each number
+that is looked for. Blows of other runs confirm it, each with the scales that they show themselves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -36,7 +36,7 @@ from scipy.stats import chi2
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.amounts import CHIEF
-from rig_identification.mismatch.response import instant_information
+from rig_identification.mismatch.response import instant_information, whitened_response
 from rig_identification.model import layout
 from rig_identification.model.motion import Motion
 
@@ -57,14 +57,16 @@ FEWEST, FAINTEST = 4, 0.05
 FINE = 8
 #: Ends of what is looked at: rate 1/s, speed after a middling blow m/s, slope m/s^2; and its prior's std.
 RATES, SPEEDS, SLOPES, SLOPING = (0.05, 8.0), (1e-4, 0.1), (-0.3, 0.3), 0.1
+#: The same of where its line lies, m: a body that is not known yet turns, and bends what all blows are.
+ASIDES, ASIDE = (-0.5, 0.5), 0.15
 #: Differential evolution: members for each number, generations.
 PEOPLE, GENERATIONS = 12, 40
 #: m/s below which a part does not come, and what such a blow's time (s) and log size are taken to be off by.
 STILL, NEVER, NOTHING_LIKE = 1e-4, 1.0, 3.0
 #: Least scales of times (s) and log sizes.
 SHARPEST, ALIKE = 0.005, 0.05
-#: Numbers that are looked for: rate, rebound, slope, travel, weight, and the two scales.
-NUMBERS = 7
+#: Numbers that are looked for: rate, rebound, slope, line, travel, weight, and scales; and of them scales.
+NUMBERS, SCALES = 9, 2
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def spikes_of(problem: Problem, evaluation: Evaluation) -> list[Spikes]:
     out = []
     for run, latent in zip(evaluation.runs, evaluation.point.latents, strict=True):
         if latent is None:
-            continue
+            raise ValueError("there is no random wrench that blows could stand out of")
         step = run.motion.step
         pull = latent * weight
         pull = pull - median_filter(pull, size=(int(SMOOTH / step) | 1, 1), mode="nearest")
@@ -116,10 +118,12 @@ def _together(white: Array, apart: int) -> tuple[NDArray[np.int64], Array]:
 
 @dataclass(frozen=True)
 class Line:
-    """A line of action in the body."""
+    """A line of action in the body, and how blows along it look."""
 
     along: Array  # (3,) unit
     at: Array  # (3,) m, its point next to the datum
+    spike: Array  # (6,) wrench of the spikes that such blows are
+    strength: float  # N along it for each of those
 
     @property
     def axis(self) -> str:
@@ -127,44 +131,81 @@ class Line:
         return AXES[int(np.argmax(np.abs(self.along)))]
 
     @property
-    def wrench(self) -> Array:
-        """(6,) of a newton along it."""
-        return np.concatenate([self.along, np.cross(self.at, self.along)])
+    def across(self) -> Array:
+        """(2, 3) unit vectors across it."""
+        first = np.eye(3)[int(np.argmin(np.abs(self.along)))]
+        first = first - (first @ self.along) * self.along
+        first /= np.linalg.norm(first)
+        return np.array([first, np.cross(self.along, first)])
 
     def impulses(self, spikes: Spikes) -> Array:
         """(K,) N s along it."""
-        row = spikes.seen @ self.wrench
-        return np.asarray(spikes.whitened @ row / (row @ row) * spikes.motion.step)
+        return sizes(spikes, self.spike) * self.strength * spikes.motion.step
 
     def own(self, spikes: Spikes) -> Array:
-        """(K,) of each spike's square what is along it."""
-        row = spikes.seen @ self.wrench
+        """(K,) of each spike's square what such a blow is."""
+        row = spikes.seen @ self.spike
         return np.asarray((spikes.whitened @ row) ** 2 / (row @ row))
 
     def chiefly(self, spikes: Spikes) -> NDArray[np.bool_]:
-        """(K,) which spikes are along it for the larger part."""
+        """(K,) which spikes are such blows for the larger part."""
         return np.asarray(self.own(spikes) > CHIEF * np.sum(spikes.whitened**2, axis=1))
 
     def share(self, every: Sequence[Spikes]) -> float:
-        """Share of all spikes' squares that is along it."""
+        """Share of all spikes' squares that such blows are."""
         total = sum(float(np.sum(s.whitened**2)) for s in every)
         return sum(float(np.sum(self.own(s))) for s in every) / max(total, 1e-300)
 
 
-def lines_of(every: Sequence[Spikes]) -> list[Line]:
-    """The line along which spikes come: along the body's axis that is nearest, and as it is measured."""
+def spike_of(every: Sequence[Spikes]) -> Array | None:
+    """(6,) The wrench that spikes are multiples of, if any is; None where there are too few."""
     if sum(s.nodes.size for s in every) < FEWEST:
-        return []
+        return None
     frame = every[0].seen
     rows = np.vstack([s.whitened @ np.linalg.solve(s.seen, np.eye(6)).T @ frame.T for s in every])
     wrench = np.linalg.solve(frame, np.linalg.svd(rows, full_matrices=False)[2][0])
-    force = float(np.linalg.norm(wrench[:3]))
+    force = wrench[:3]
+    size = float(np.linalg.norm(force)) or float(np.linalg.norm(wrench))
+    return np.asarray(wrench / size * (-1.0 if force[np.argmax(np.abs(force))] < 0.0 else 1.0))
+
+
+def sizes(spikes: Spikes, spike: Array) -> Array:
+    """(K,) of how many such wrenches each is the sum."""
+    row = spikes.seen @ spike
+    return np.asarray(spikes.whitened @ row / (row @ row))
+
+
+def lines_of(spike: Array, blow: Array) -> list[Line]:
+    """The lines of action that blows may have: along the body's nearest axis, and as it is measured.
+
+    spike, blow: (6,) what such a blow shows of itself in a node or two, and what it is.
+    """
+    force = float(np.linalg.norm(blow[:3]))
     if force == 0.0:
         return []
-    along, moment = wrench[:3] / force, wrench[3:] / force
-    along, moment = (-along, -moment) if along[np.argmax(np.abs(along))] < 0.0 else (along, moment)
-    axis = np.eye(3)[int(np.argmax(np.abs(along)))]
-    return [Line(axis, np.cross(axis, moment)), Line(along, np.cross(along, moment))]
+    along, moment = blow[:3] / force, blow[3:] / force
+    axis = np.zeros(3)
+    axis[np.argmax(np.abs(along))] = np.sign(along[np.argmax(np.abs(along))])
+    return [Line(d, np.cross(d, moment), spike, force) for d in (axis, along)]
+
+
+def _blow_of(every: Sequence[Spikes], evaluations: Sequence[Evaluation], spike: Array) -> Array:
+    """(6,) What blows are all together, as all recordings tell it, for each ``spike`` of theirs.
+
+    A force that few sensors feel at once shows in what comes after, and its spike has but a part of it: told
+    from spikes alone a line would lie too far from the datum. Here every blow has the size of its spike, and
+    the six numbers of one wrench are free, with all of its response.
+    """
+    right, information = np.zeros(6), np.zeros((6, 6))
+    runs = [run for evaluation in evaluations for run in evaluation.runs]
+    for spikes, run in zip(every, runs, strict=True):
+        size = sizes(spikes, spike)
+        wrenches = np.zeros((spikes.motion.outputs.shape[0], 6, 6))
+        wrenches[spikes.nodes] = size[:, None, None] * np.eye(6)
+        rows = whitened_response(run, wrenches)
+        right += rows.T @ run.residual
+        information += rows.T @ rows
+    return np.asarray(np.linalg.lstsq(information, right, rcond=None)[0])
 
 
 @njit(cache=True, nogil=True)
@@ -211,8 +252,8 @@ class Gaps:
             before += list(impulses[kept[:-1]])
             after += list(impulses[kept[1:]])
             step += [spikes.motion.step] * max(kept.size - 1, 0)
-            begun += force[-1].size
-        self._force = np.concatenate(force) if force else np.zeros(0)
+            begun += force[-1].shape[0]
+        self._force = np.concatenate(force) if force else np.zeros((0, 3))
         self._first, self._last = np.array(first, dtype=np.int64), np.array(last, dtype=np.int64)
         self._step = np.array(step, dtype=float)
         self.before, self.after = np.array(before, dtype=float), np.array(after, dtype=float)
@@ -224,9 +265,9 @@ class Gaps:
         return int(self.after.size)
 
     @property
-    def mean(self) -> float:
-        """Mean length, s."""
-        return float(np.mean((self._last - self._first) * self._step))
+    def lengths(self) -> Array:
+        """(G,) s."""
+        return np.asarray((self._last - self._first) * self._step)
 
     def weight(self, slide: Slide) -> float | None:
         """Impulse of a blow over the speed at which the part comes, kg; None where it comes to none."""
@@ -241,20 +282,20 @@ class Gaps:
         out = np.empty((self.count, 2))
         speed = slide.left * np.abs(self.before)
         side = np.sign(self.before)
-        _flights(self._force, self._first, self._last, side, speed, self._step, slide.rate, slide.slope, out)
+        force = self._force @ np.array([1.0, *slide.aside])
+        _flights(force, self._first, self._last, side, speed, self._step, slide.rate, slide.slope, out)
         return out[:, 0], np.where(self.same, -out[:, 1], out[:, 1])
 
 
 def _felt(motion: Motion, line: Line) -> Array:
-    """(N,) specific force along a line of the body."""
-    out = motion.outputs
-    turning = out[:, RATE : RATE + 3]
-    there = (
-        out[:, FORCE : FORCE + 3]
-        + np.cross(out[:, ALPHA : ALPHA + 3], line.at)
-        + np.cross(turning, np.cross(turning, line.at))
-    )
-    return np.ascontiguousarray(there @ line.along)
+    """(N, 3) specific force along a line of the body, and what it gains for each metre aside of it."""
+    turning, gaining = motion.outputs[:, RATE : RATE + 3], motion.outputs[:, ALPHA : ALPHA + 3]
+
+    def turned(at: Array) -> Array:
+        return np.asarray(np.cross(gaining, at) + np.cross(turning, np.cross(turning, at)))
+
+    there = [motion.outputs[:, FORCE : FORCE + 3] + turned(line.at), *map(turned, line.across)]
+    return np.column_stack([part @ line.along for part in there])
 
 
 @dataclass(frozen=True)
@@ -264,6 +305,7 @@ class Slide:
     rate: float  # 1/s: what slows it
     left: float  # m/s after a blow of one N s
     slope: float  # m/s^2, of its floor
+    aside: tuple[float, float] = (0.0, 0.0)  # m, by which its line is off, along ``Line.across``
 
 
 @dataclass(frozen=True)
@@ -279,14 +321,16 @@ class Arrival:
 
 
 def _arrival(gaps: Gaps, slide: Slide, known: Arrival | None = None) -> Arrival:
-    """Times and sizes with a slide. known: with distance, weight and scales of other runs."""
+    """Times and sizes with a slide. known: with distance and weight of other runs."""
     way, speed = gaps.arrivals(slide)
     across = way[~gaps.same]
     if known is None:
         apart = float(np.median(across)) if across.size else float("nan")
         weight = gaps.weight(slide) or 1.0
     else:
-        apart, weight = known.apart, known.weight
+        # Where one stop alone was hit, nothing is known of the other
+        seen = np.isfinite(known.apart) or not across.size
+        apart, weight = known.apart if seen else float(np.median(across)), known.weight
     short, fast = np.where(gaps.same, way, way - apart), np.maximum(speed, STILL)
     told = (speed > STILL) & np.isfinite(short)
     size = np.log(np.abs(gaps.after))
@@ -296,9 +340,8 @@ def _arrival(gaps: Gaps, slide: Slide, known: Arrival | None = None) -> Arrival:
     late, unlike, wide = (
         max(float(np.median(a)), b) for a, b in ((times, SHARPEST), (off, ALIKE), (about, ALIKE))
     )
-    if known is not None:
-        late, unlike = known.late, known.unlike
-    timed = np.log(gaps.mean) - _cauchy(times, late) - np.log(np.pi)
+    mean = float(np.mean(gaps.lengths))
+    timed = np.log(mean) + gaps.lengths / mean - _cauchy(times, late) - np.log(np.pi)
     sized = _cauchy(about, wide) - _cauchy(off, unlike)
     return Arrival(slide, apart, weight, late, unlike, float(np.sum(timed + sized)))
 
@@ -314,13 +357,17 @@ def _likeliest(gaps: Gaps) -> Arrival:
         (float(np.log(RATES[0])), float(np.log(RATES[1]))),
         (float(np.log(SPEEDS[0] / middling)), float(np.log(SPEEDS[1] / middling))),
         SLOPES,
+        ASIDES,
+        ASIDES,
     ]
 
     def with_(x: Array) -> Arrival:
-        return _arrival(gaps, Slide(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2])))
+        aside = float(x[3]), float(x[4])
+        return _arrival(gaps, Slide(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), aside))
 
     def unlikely(x: Array) -> float:
-        return 0.5 * float(x[2] / SLOPING) ** 2 - with_(x).nats
+        far = (x[2] / SLOPING) ** 2 + (x[3] / ASIDE) ** 2 + (x[4] / ASIDE) ** 2
+        return 0.5 * float(far) - with_(x).nats
 
     found = differential_evolution(
         unlikely, bounds, popsize=PEOPLE, maxiter=GENERATIONS, seed=1, polish=False
@@ -350,34 +397,40 @@ def knocking(seen: tuple[Problem, Evaluation], held: tuple[Problem, Evaluation])
     seen, held: about their measured motion. Whether the blows' times convince is in ``timed`` and
     ``confirmed``: a slide is made for those of the runs that have more, and confirmed by the others.
     """
-    return knocking_in(spikes_of(*seen), spikes_of(*held))
+    fitted, others = spikes_of(*seen), spikes_of(*held)
+    spike = spike_of([*fitted, *others])
+    if spike is None:
+        return None
+    return likelier(lines_of(spike, _blow_of([*fitted, *others], [seen[1], held[1]], spike)), fitted, others)
 
 
-def knocking_in(fitted: list[Spikes], held: list[Spikes]) -> Knocks | None:
-    """The same, of spikes that are known."""
-    found = [_knocks(line, fitted, held) for line in lines_of([*fitted, *held])]
+def likelier(lines: Sequence[Line], fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Knocks | None:
+    """What knocks along one of some lines; None: nothing does in both."""
+    found = [_knocks(line, fitted, held) for line in lines]
     return max((k for k in found if k is not None), key=lambda k: k.timed, default=None)
 
 
-def _knocks(line: Line, fitted: list[Spikes], held: list[Spikes]) -> Knocks | None:
+def _knocks(line: Line, fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Knocks | None:
     if min(line.share(fitted), line.share(held)) < CHIEF:
         return None
     gaps, others = sorted((Gaps(line, fitted), Gaps(line, held)), key=lambda g: -g.count)
     if gaps.count < FEWEST or not others.count:
         return None
     arrival = _likeliest(gaps)
-    confirmed = _arrival(others, arrival.slide, arrival).nats
+    confirmed = _arrival(others, arrival.slide, arrival).nats - 0.5 * SCALES * float(np.log(others.count))
     mass = arrival.weight / (1.0 + arrival.slide.left * arrival.weight)
     weight = others.weight(arrival.slide)
     apart = 0.0 if weight is None else float(np.log(weight / arrival.weight))
-    across = gaps.arrivals(arrival.slide)[0][~gaps.same]
+    across = [g.arrivals(arrival.slide)[0][~g.same] for g in (gaps, others)]
+    way = np.concatenate(across)
+    line = replace(line, at=line.at + np.array(arrival.slide.aside) @ line.across)
     return Knocks(
         line,
         sum(int(np.sum(line.chiefly(s))) for s in (*fitted, *held)),
         mass,
         mass * float(np.hypot(arrival.unlike / NORMAL, apart)),
-        0.5 * arrival.apart if across.size else None,
-        0.5 * float(np.median(np.abs(across - arrival.apart))) / NORMAL if across.size else 0.0,
+        0.5 * float(np.median(way)) if way.size else None,
+        0.5 * float(np.median(np.abs(way - np.median(way)))) / NORMAL if way.size else 0.0,
         0.5 * sum(float(np.sum(line.own(s))) for s in fitted),
         0.5 * sum(float(np.sum(line.own(s))) for s in held),
         arrival.nats - 0.5 * NUMBERS * float(np.log(gaps.count)) + confirmed,
