@@ -36,6 +36,8 @@ from scipy.stats import chi2
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.amounts import CHIEF
+from rig_identification.mismatch.beyond import Beyond
+from rig_identification.mismatch.loose import beyond_of
 from rig_identification.mismatch.response import instant_information, whitened_response
 from rig_identification.model import layout
 from rig_identification.model.motion import Motion
@@ -56,11 +58,13 @@ FEWEST, FAINTEST = 4, 0.05
 #: Integration steps between two nodes.
 FINE = 8
 #: Ends of what is looked at: rate 1/s, speed after a middling blow m/s, slope m/s^2; and its prior's std.
-RATES, SPEEDS, SLOPES, SLOPING = (0.05, 8.0), (1e-4, 0.1), (-0.3, 0.3), 0.1
+RATES, SPEEDS, SLOPES, SLOPING = (0.05, 8.0), (1e-4, 0.1), (-0.3, 0.3), 0.05
 #: The same of where its line lies, m: a body that is not known yet turns, and bends what all blows are.
 ASIDES, ASIDE = (-0.5, 0.5), 0.15
 #: Differential evolution: members for each number, generations.
 PEOPLE, GENERATIONS = 12, 40
+#: Nats that a slide may be less likely than the best and still be as likely: two std of a normal error.
+TWO_STD = 2.0
 #: m/s below which a part does not come, and what such a blow's time (s) and log size are taken to be off by.
 STILL, NEVER, NOTHING_LIKE = 1e-4, 1.0, 3.0
 #: Least scales of times (s) and log sizes.
@@ -189,22 +193,24 @@ def lines_of(spike: Array, blow: Array) -> list[Line]:
     return [Line(d, np.cross(d, moment), spike, force) for d in (axis, along)]
 
 
-def _blow_of(every: Sequence[Spikes], evaluations: Sequence[Evaluation], spike: Array) -> Array:
+def _blow_of(told: Sequence[tuple[Sequence[Spikes], Beyond]], spike: Array) -> Array:
     """(6,) What blows are all together, as all recordings tell it, for each ``spike`` of theirs.
 
     A force that few sensors feel at once shows in what comes after, and its spike has but a part of it: told
     from spikes alone a line would lie too far from the datum. Here every blow has the size of its spike, and
-    the six numbers of one wrench are free, with all of its response.
+    the six numbers of one wrench are free, with all of its response, beside all that is free anyway.
     """
     right, information = np.zeros(6), np.zeros((6, 6))
-    runs = [run for evaluation in evaluations for run in evaluation.runs]
-    for spikes, run in zip(every, runs, strict=True):
-        size = sizes(spikes, spike)
-        wrenches = np.zeros((spikes.motion.outputs.shape[0], 6, 6))
-        wrenches[spikes.nodes] = size[:, None, None] * np.eye(6)
-        rows = whitened_response(run, wrenches)
-        right += rows.T @ run.residual
-        information += rows.T @ rows
+    for every, beyond in told:
+        rows: list[Array | None] = []
+        for spikes, run in zip(every, beyond.full.runs, strict=True):
+            size = sizes(spikes, spike)
+            wrenches = np.zeros((spikes.motion.outputs.shape[0], 6, 6))
+            wrenches[spikes.nodes] = size[:, None, None] * np.eye(6)
+            rows.append(whitened_response(run, wrenches))
+        found = beyond.of(rows)
+        right += found.right
+        information += found.information([own for own in rows if own is not None])
     return np.asarray(np.linalg.lstsq(information, right, rcond=None)[0])
 
 
@@ -319,6 +325,11 @@ class Arrival:
     unlike: float  # scale of log sizes
     nats: float  # by which that is likelier than chance, nothing charged
 
+    @property
+    def mass(self) -> float:
+        """Of the part, kg."""
+        return self.weight / (1.0 + self.slide.left * self.weight)
+
 
 def _arrival(gaps: Gaps, slide: Slide, known: Arrival | None = None) -> Arrival:
     """Times and sizes with a slide. known: with distance and weight of other runs."""
@@ -351,7 +362,11 @@ def _cauchy(error: Array, scale: float) -> Array:
     return np.asarray(np.log1p((error / scale) ** 2) + np.log(scale))
 
 
-def _likeliest(gaps: Gaps) -> Arrival:
+def _likely(gaps: Gaps) -> list[Arrival]:
+    """Slides that are as likely as any, the likeliest first.
+
+    Times hold on to combinations of rate, slope and place: along a valley of slides the weight may double.
+    """
     middling = float(np.median(np.abs(gaps.before)))
     bounds = [
         (float(np.log(RATES[0])), float(np.log(RATES[1]))),
@@ -360,19 +375,24 @@ def _likeliest(gaps: Gaps) -> Arrival:
         ASIDES,
         ASIDES,
     ]
-
-    def with_(x: Array) -> Arrival:
-        aside = float(x[3]), float(x[4])
-        return _arrival(gaps, Slide(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), aside))
+    seen: list[tuple[float, Arrival]] = []
 
     def unlikely(x: Array) -> float:
+        aside = float(x[3]), float(x[4])
+        there = _arrival(gaps, Slide(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), aside))
         far = (x[2] / SLOPING) ** 2 + (x[3] / ASIDE) ** 2 + (x[4] / ASIDE) ** 2
-        return 0.5 * float(far) - with_(x).nats
+        seen.append((0.5 * float(far) - there.nats, there))
+        return seen[-1][0]
 
-    found = differential_evolution(
-        unlikely, bounds, popsize=PEOPLE, maxiter=GENERATIONS, seed=1, polish=False
-    )
-    return with_(found.x)
+    differential_evolution(unlikely, bounds, popsize=PEOPLE, maxiter=GENERATIONS, seed=1, polish=False)
+    seen.sort(key=lambda s: s[0])
+    return [there for cost, there in seen if cost < seen[0][0] + TWO_STD]
+
+
+def _middle(values: Sequence[float]) -> tuple[float, float]:
+    """Middle and std of what is as likely as the best, two std either side."""
+    least, most = min(values), max(values)
+    return 0.5 * (least + most), 0.25 * (most - least)
 
 
 @dataclass(frozen=True)
@@ -401,7 +421,8 @@ def knocking(seen: tuple[Problem, Evaluation], held: tuple[Problem, Evaluation])
     spike = spike_of([*fitted, *others])
     if spike is None:
         return None
-    return likelier(lines_of(spike, _blow_of([*fitted, *others], [seen[1], held[1]], spike)), fitted, others)
+    blow = _blow_of([(fitted, beyond_of(*seen)), (others, beyond_of(*held, fixed=True))], spike)
+    return likelier(lines_of(spike, blow), fitted, others)
 
 
 def likelier(lines: Sequence[Line], fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Knocks | None:
@@ -416,23 +437,33 @@ def _knocks(line: Line, fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Kno
     gaps, others = sorted((Gaps(line, fitted), Gaps(line, held)), key=lambda g: -g.count)
     if gaps.count < FEWEST or not others.count:
         return None
-    arrival = _likeliest(gaps)
+    likely = _likely(gaps)
+    arrival = likely[0]
     confirmed = _arrival(others, arrival.slide, arrival).nats - 0.5 * SCALES * float(np.log(others.count))
-    mass = arrival.weight / (1.0 + arrival.slide.left * arrival.weight)
     weight = others.weight(arrival.slide)
     apart = 0.0 if weight is None else float(np.log(weight / arrival.weight))
-    across = [g.arrivals(arrival.slide)[0][~g.same] for g in (gaps, others)]
-    way = np.concatenate(across)
+    mass, doubt = _middle([float(np.log(a.mass)) for a in likely])
+    every = [_stops(a, (gaps, others)) for a in likely]
+    travel = _middle([middle for middle, _ in every])
     line = replace(line, at=line.at + np.array(arrival.slide.aside) @ line.across)
     return Knocks(
         line,
         sum(int(np.sum(line.chiefly(s))) for s in (*fitted, *held)),
-        mass,
-        mass * float(np.hypot(arrival.unlike / NORMAL, apart)),
-        0.5 * float(np.median(way)) if way.size else None,
-        0.5 * float(np.median(np.abs(way - np.median(way)))) / NORMAL if way.size else 0.0,
+        float(np.exp(mass)),
+        float(np.exp(mass) * np.linalg.norm([arrival.unlike / NORMAL, apart, doubt])),
+        travel[0] if np.isfinite(travel[0]) else None,
+        float(np.hypot(travel[1], every[0][1])),
         0.5 * sum(float(np.sum(line.own(s))) for s in fitted),
         0.5 * sum(float(np.sum(line.own(s))) for s in held),
         arrival.nats - 0.5 * NUMBERS * float(np.log(gaps.count)) + confirmed,
         confirmed,
     )
+
+
+def _stops(arrival: Arrival, every: Sequence[Gaps]) -> tuple[float, float]:
+    """Half the distance between the stops, m, and by what the ways across differ; NaN where there is none."""
+    way = np.concatenate([g.arrivals(arrival.slide)[0][~g.same] for g in every])
+    if not way.size:
+        return float("nan"), float("nan")
+    middle = float(np.median(way))
+    return 0.5 * middle, 0.5 * float(np.median(np.abs(way - middle))) / NORMAL

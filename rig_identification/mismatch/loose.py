@@ -204,6 +204,13 @@ class Gain:
     std: float  # kg
 
 
+def beyond_of(noisy: Problem, evaluation: Evaluation, *, fixed: bool = False) -> Beyond:
+    """What is free beside a part. fixed: the body and the rig are as they are, and only starts are free."""
+    size = noisy.bench.parameters.size
+    free = free_without(noisy, evaluation.point, evaluation, set(), 0)
+    return Beyond(evaluation, free[free >= size] if fixed else free, size)
+
+
 class Along:
     """A problem about its measured motion, to try loose parts on.
 
@@ -222,9 +229,7 @@ class Along:
             for run, latent in zip(evaluation.runs, evaluation.point.latents, strict=True)
             if latent is not None
         ]
-        size = noisy.bench.parameters.size
-        free = free_without(noisy, evaluation.point, evaluation, set(), 0)
-        self._beyond = Beyond(evaluation, free[free >= size] if fixed else free, size)
+        self._beyond = beyond_of(noisy, evaluation, fixed=fixed)
 
     def likeness(self, parts: Sequence[Loose]) -> Array:
         """(S,) about how much (nats) of the random wrench parts along one axis make needless, each alone.
