@@ -51,8 +51,10 @@ SMOOTH, APART = 0.2, 0.03
 CHANCE, CALM = 1e-3, 3.0
 #: Median of a normal error's size, in std.
 NORMAL = 0.6745
-#: Share of the mean variance that is added to each direction's: one in which nothing is asked has none.
-EVEN = 1e-9
+#: Share of all six variances that is added to each, and least that is: where nothing is asked there is none.
+EVEN, TINY = 1e-9, 1e-30
+#: Nodes at least whose spread tells that of all.
+FEW = 50
 #: Least number of blows along one line, and least share of the largest that a blow has.
 FEWEST, FAINTEST = 4, 0.05
 #: Integration steps between two nodes.
@@ -99,15 +101,20 @@ def spikes_of(problem: Problem, evaluation: Evaluation) -> list[Spikes]:
         step = run.motion.step
         pull = latent * weight
         pull = pull - median_filter(pull, size=(int(SMOOTH / step) | 1, 1), mode="nearest")
-        root = np.linalg.cholesky(instant_information(run))
+        root = _root(instant_information(run))
         alone = np.linalg.solve(root, pull.T).T
         spread = np.median(np.abs(alone), axis=0) / NORMAL
-        calm = alone[np.all(np.abs(alone) <= CALM * spread, axis=1)]
-        own = np.linalg.cholesky(np.cov(calm.T) + EVEN * np.mean(spread**2) * np.eye(6))
+        calm = np.all(np.abs(alone) <= CALM * spread, axis=1)
+        own = _root(np.cov(alone[calm].T) if np.sum(calm) > FEW else np.cov(alone.T))
         white = np.linalg.solve(own, alone.T).T
         nodes, sums = _together(white, max(1, round(APART / step)))
         out.append(Spikes(run.motion, nodes, sums, np.linalg.solve(own, root.T)))
     return out
+
+
+def _root(matrix: Array) -> Array:
+    """Lower triangular root of a symmetric matrix of which nothing is to be divided by."""
+    return np.asarray(np.linalg.cholesky(matrix + max(EVEN * float(np.trace(matrix)), TINY) * np.eye(6)))
 
 
 def _together(white: Array, apart: int) -> tuple[NDArray[np.int64], Array]:
@@ -275,9 +282,8 @@ class Gaps:
         """(G,) s."""
         return np.asarray((self._last - self._first) * self._step)
 
-    def weight(self, slide: Slide) -> float | None:
-        """Impulse of a blow over the speed at which the part comes, kg; None where it comes to none."""
-        speed = self.arrivals(slide)[1]
+    def weight(self, speed: Array) -> float | None:
+        """Impulse of a blow over the speed (G,) at which the part comes, kg; None where it comes to none."""
         coming = speed > STILL
         if not np.any(coming):
             return None
@@ -337,7 +343,7 @@ def _arrival(gaps: Gaps, slide: Slide, known: Arrival | None = None) -> Arrival:
     across = way[~gaps.same]
     if known is None:
         apart = float(np.median(across)) if across.size else float("nan")
-        weight = gaps.weight(slide) or 1.0
+        weight = gaps.weight(speed) or 1.0
     else:
         # Where one stop alone was hit, nothing is known of the other
         seen = np.isfinite(known.apart) or not across.size
@@ -440,7 +446,7 @@ def _knocks(line: Line, fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Kno
     likely = _likely(gaps)
     arrival = likely[0]
     confirmed = _arrival(others, arrival.slide, arrival).nats - 0.5 * SCALES * float(np.log(others.count))
-    weight = others.weight(arrival.slide)
+    weight = others.weight(others.arrivals(arrival.slide)[1])
     apart = 0.0 if weight is None else float(np.log(weight / arrival.weight))
     mass, doubt = _middle([float(np.log(a.mass)) for a in likely])
     every = [_stops(a, (gaps, others)) for a in likely]
