@@ -9,10 +9,10 @@ from test_mismatch_whole_rivals import fit_of, ideal_of, search_in, whole_with
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
-from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.left_over import _next_to_none
+from rig_identification.mismatch.left_over import _next_to_none, unexplained
 from rig_identification.mismatch.look import Look
 from rig_identification.mismatch.named import _adds_nothing
 from rig_identification.mismatch.outcome import Trials
@@ -59,16 +59,14 @@ def test_names_that_leave_next_to_nothing_are_told_from_those_that_stand_in(
     assert not _next_to_none(ideal, whole, [damping, replace(damping, candidate=bends)])
 
 
-def test_near_the_noise_what_takes_a_hundredth_of_what_shows_is_not_fitted(
-    damped: tuple[Ideal, Search],
-) -> None:
-    _, search = damped
+def _look(search: Search) -> Look:
+    """A look near the noise at which air promises a tenth of what shows, and heavy cables a hundredth."""
     candidates = catalogue(search.problem)
     promises = [
         Promise(next(c for c in candidates if c.effect == effect), 1e3, {}, share)
         for effect, share in (("air_drag", 0.1), ("cable_mass", 0.01))
     ]
-    look = Look(
+    return Look(
         search.problem,
         search.evaluation,
         search.problem,
@@ -82,8 +80,33 @@ def test_near_the_noise_what_takes_a_hundredth_of_what_shows_is_not_fitted(
         UNLIMITED,
         None,
     )
-    assert look._worthy(promises) == promises[:1]
-    assert replace(look, far=True)._worthy(promises) == promises
+
+
+def test_near_the_noise_what_takes_a_hundredth_of_what_shows_is_not_fitted(
+    damped: tuple[Ideal, Search],
+) -> None:
+    look = _look(damped[1])
+    assert look._worthy(look.promises) == look.promises[:1]
+    assert replace(look, far=True)._worthy(look.promises) == look.promises
+
+
+def test_what_time_was_short_of_is_named_and_ties_with_nothing(damped: tuple[Ideal, Search]) -> None:
+    ideal, search = damped
+    look = _look(search)
+    waiting = look.waiting
+    assert [p.candidate.effect for p in waiting] == ["air_drag"]
+    look.notify(waiting[0].candidate.label)
+    assert not look.waiting
+    over = replace(search.forked(), budget=Budget(0.0), waiting=waiting)
+    told = unexplained(ideal, over, None, lambda stage, share: None)
+    assert told.mismatch.verdict == "unexplained"
+    assert "short of air_drag and others." in told.mismatch.explanation
+    last = told.mismatch.alternatives[-1]
+    assert (last["effect"], last["fitted"]) == ("air_drag", False)
+    # First order says that nine tenths are left with it
+    assert last["log_likelihood_gap"] == pytest.approx(9e3)
+    in_time = unexplained(ideal, replace(over, budget=UNLIMITED), None, lambda stage, share: None)
+    assert not in_time.mismatch.alternatives
 
 
 @pytest.mark.parametrize(("label", "nothing"), [("exciter_gain exciter", True), ("hinge_damping", False)])

@@ -12,6 +12,7 @@ from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Told
 from rig_identification.mismatch.experiments import experiment_for
+from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Finding, Mismatch
 
@@ -66,6 +67,8 @@ def finding(
     )
 
 
+#: Least gap (nats) of what was not fitted.
+NO_TIE = 10.0
 #: Of what is told of readings before anything is fitted.
 NO_EVIDENCE: dict[str, float | None] = {
     "log_likelihood_gain": None,
@@ -97,6 +100,21 @@ def rival(trial: Trial, gap: float) -> dict[str, object]:
         "log_likelihood_gap": float(gap),
         "parameters": written(trial.candidate.told(values, stds)),
         "experiment": experiment_for(trial.candidate.kind),
+    }
+
+
+def not_fitted(promise: Promise) -> dict[str, object]:
+    """An entry of ``alternatives``: what promised much, and time was over before it could be fitted.
+
+    Its gap is what first order says that it would leave, and never a tie.
+    """
+    left = promise.gain * (1.0 / promise.share - 1.0) if promise.share > 0.0 else 0.0
+    return {
+        "effect": promise.candidate.effect,
+        "where": dict(promise.candidate.where),
+        "log_likelihood_gap": max(float(left), NO_TIE),
+        "fitted": False,
+        "experiment": experiment_for(promise.candidate.kind),
     }
 
 

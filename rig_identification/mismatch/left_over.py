@@ -12,7 +12,7 @@ from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.explained import Explained, evidence_of
-from rig_identification.mismatch.findings import called, rival
+from rig_identification.mismatch.findings import called, not_fitted, rival
 from rig_identification.mismatch.first_fits import NO_STAND_IN, shows
 from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.something_loose import loose_finding
@@ -63,7 +63,12 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         kept, fitted = loose
         explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
     if search.budget.spent():
-        explanation += f" The search ended after {search.budget.seconds:.0f} s, short of some hypotheses."
+        explanation += f" The search ended after {search.budget.seconds:.0f} s, short of "
+        short = [p.candidate for p in search.waiting]
+        explanation += ", ".join(called(c.effect, c.where) for c in short) or "some hypotheses"
+        explanation += " and others." if short else "."
+        known = {str(r["effect"]) for r in rivals}
+        rivals = (*rivals, *(not_fitted(p) for p in search.waiting if p.candidate.effect not in known))
     # Where whole runs with what is told are noise, and something else contradicts, no force is missing
     missing = not kept or shows(fitted.evaluation)
     unknown = _unknown(ideal.fitted, here, evaluation, search.liar) if missing else None

@@ -58,6 +58,8 @@ from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, 
 FINISHED = 3
 #: What gives way or swings that is tried before changes of numbers which promise less.
 AT_ONCE = 3
+#: Hypotheses that are named where time was over before they could be fitted.
+WAITING = 3
 #: Promises as good as the best that are fitted beside what is certain.
 ALIKE = 2
 
@@ -75,7 +77,7 @@ class Look:
     mass: float  # kg, of the body
     limit: float  # of ordinary errors, in tolerances
     far: bool  # whether much is left
-    notify: Notify
+    tell: Notify
     budget: Budget
     alone: Alone = NOTHING
     led: Trial | None = None  # what led here: with it nothing was left of what the first effect was fitted to
@@ -92,6 +94,12 @@ class Look:
     rung: set[str] = field(default_factory=set)  # labels of ceilings that were tried like a part on springs
     refused: int = 0  # of what was tried, that were asked whether with one more they leave nothing
     slowly: list[Promise] = field(default_factory=list)  # along the measured motion, what is fitted slowly
+    said: set[str] = field(default_factory=set)  # what it is at and has been at: labels of all that was begun
+
+    def notify(self, label: str) -> None:
+        """Say what it is at."""
+        self.said.add(label)
+        self.tell(label)
 
     @property
     def count(self) -> int:
@@ -163,6 +171,16 @@ class Look:
         """Promises of what has not been tried."""
         known = {t.candidate.label for t in self.tried} | self.hopeless
         return [p for p in promises if p.candidate.label not in known]
+
+    @property
+    def waiting(self) -> tuple[Promise, ...]:
+        """What promises most of what was never fitted, one of a kind."""
+        begun = {p.candidate.kind for p in self.promises if p.candidate.label in self.said}
+        best: dict[str, Promise] = {}
+        for promise in self._worthy(self.promises):
+            if promise.candidate.kind not in begun:
+                best.setdefault(promise.candidate.kind, promise)
+        return tuple(best.values())[:WAITING]
 
     def _worthy(self, promises: list[Promise]) -> list[Promise]:
         """The promises worth a fit here.

@@ -108,6 +108,7 @@ class _Naming:
         self.known = Trials(list(tried.beside), asked=tried.asked) if tried.beside else None
         search.screened = None
         search.liar = search.liar or tried.liar
+        search.waiting = tried.waiting if search.budget.spent() else ()
         return tried
 
     def _alone(self) -> Alone:

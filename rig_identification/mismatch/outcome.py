@@ -12,6 +12,7 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.along_measured import Along
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial
 
 #: What explains the session with a law instead: of pieces, and what they leave, if it has more log evidence
@@ -51,6 +52,7 @@ class Trials:
     beside: tuple[Trial, ...] = ()  # what it leads to, likeliest first, where that is fitted already
     asked: bool = False  # whether rivals of that were asked as well
     left: float = 0.0  # nats, without any of them
+    waiting: tuple[Promise, ...] = ()  # what promised most of what was never fitted, one of a kind
 
     def rivals_of(self, chosen: Trial) -> list[tuple[float, Trial]]:
         """What is stated beside ``chosen``, and by how much (nats) it trails.

@@ -33,6 +33,7 @@ class Search:
     found: list[Trial] = field(default_factory=list)
     rivals: list[dict[str, object]] = field(default_factory=list)
     bodies: Bodies = ()  # what rivals of the last one found make of the body, where whole runs say so
+    waiting: tuple[Promise, ...] = ()  # what promised most of what was not fitted before time was over
     liar: str | None = None
     screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
 

@@ -81,7 +81,7 @@ def leads(look: Look, done: list[Trial], *, asked: bool = False) -> Trials:
 def ended(look: Look) -> Trials:
     """The likeliest of what was tried, fitted to its end."""
     if not look.tried:
-        return Trials([], look.device)
+        return Trials([], look.device, waiting=look.waiting)
     tried = sorted((_fair(look, t) for t in look.tried), key=lambda t: -t.evidence)
     done: list[Trial] = []
     beaten: list[Trial] = []
@@ -113,6 +113,7 @@ def ended(look: Look) -> Trials:
         unsure=tuple(map(among_places, unsure)),
         chief=chief,
         left=look.left,
+        waiting=look.waiting,
     )
 
 

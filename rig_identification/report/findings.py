@@ -101,6 +101,8 @@ def _alternative(alternative: Mapping[str, object]) -> AlternativeView:
     if isinstance(parameters, Mapping) and parameters:
         name, value, half, unit = _parameter(*next(iter(parameters.items())))
         amount = f"{name} {value} ± {half} {unit}" if half else f"{name} {value} {unit}"
+    elif alternative.get("fitted") is False:
+        amount = "not fitted: time was over"
     return AlternativeView(
         effect=_words(str(alternative.get("effect", ""))),
         where=", ".join(str(place) for place in places if isinstance(place, str)),
