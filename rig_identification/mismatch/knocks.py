@@ -173,7 +173,7 @@ def spike_of(every: Sequence[Spikes]) -> Array | None:
     if sum(s.nodes.size for s in every) < FEWEST:
         return None
     frame = every[0].seen
-    rows = np.vstack([s.whitened @ np.linalg.solve(s.seen, np.eye(6)).T @ frame.T for s in every])
+    rows = np.vstack([(frame @ np.linalg.solve(s.seen, s.whitened.T)).T for s in every])
     wrench = np.linalg.solve(frame, np.linalg.svd(rows, full_matrices=False)[2][0])
     force = wrench[:3]
     size = float(np.linalg.norm(force)) or float(np.linalg.norm(wrench))
@@ -195,8 +195,8 @@ def lines_of(spike: Array, blow: Array) -> list[Line]:
     if force == 0.0:
         return []
     along, moment = blow[:3] / force, blow[3:] / force
-    axis = np.zeros(3)
-    axis[np.argmax(np.abs(along))] = np.sign(along[np.argmax(np.abs(along))])
+    nearest, axis = int(np.argmax(np.abs(along))), np.zeros(3)
+    axis[nearest] = np.sign(along[nearest])
     return [Line(d, np.cross(d, moment), spike, force) for d in (axis, along)]
 
 
@@ -252,7 +252,6 @@ class Gaps:
     """What lies between blows along a line, run after run."""
 
     def __init__(self, line: Line, every: Sequence[Spikes]) -> None:
-        self.line = line
         force, first, last, step, before, after = [], [], [], [], [], []
         begun = 0
         for spikes in every:
@@ -411,8 +410,7 @@ class Knocks:
     std: float  # kg
     travel: float | None  # m either side; None where it hits one stop alone
     travel_std: float
-    gain: float  # nats that its line takes away, and does in held-out runs
-    again: float
+    gain: float  # nats that its line takes away in the runs that were fitted
     timed: float  # nats by which its slide tells times and sizes of all blows
     confirmed: float  # ... of those that it was not made for
 
@@ -460,7 +458,6 @@ def _knocks(line: Line, fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Kno
         travel[0] if np.isfinite(travel[0]) else None,
         float(np.hypot(travel[1], every[0][1])),
         0.5 * sum(float(np.sum(line.own(s))) for s in fitted),
-        0.5 * sum(float(np.sum(line.own(s))) for s in held),
         arrival.nats - 0.5 * NUMBERS * float(np.log(gaps.count)) + confirmed,
         confirmed,
     )

@@ -175,10 +175,10 @@ class Look:
     @property
     def waiting(self) -> tuple[Promise, ...]:
         """What promises most of what was never fitted, one of a kind."""
-        begun = {p.candidate.kind for p in self.promises if p.candidate.label in self.said}
+        known = {p.candidate.kind for p in self.promises if p.candidate.label in self.said}
         best: dict[str, Promise] = {}
         for promise in self._worthy(self.promises):
-            if promise.candidate.kind not in begun:
+            if promise.candidate.kind not in known:
                 best.setdefault(promise.candidate.kind, promise)
         return tuple(best.values())[:WAITING]
 
