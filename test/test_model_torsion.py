@@ -52,7 +52,7 @@ def test_cables_that_hang_straight_take_all_of_a_turn_about_the_vertical() -> No
         hinge = sample.start.position + R @ physics[o + layout.BODY_POINT :][:3]
         physics[o + layout.CEILING_POINT :][:3] = hinge + np.array([0.0, 0.0, 1e3])
     x, wrench = np.concatenate([sample.start.position, np.zeros(9)]), np.zeros(6)
-    add_cable_torsion(physics, block, model.modes, x, R, wrench)
+    add_cable_torsion(physics, block, model.modes, (0, model.cables), x, R, wrench)
     expected = [0.0, 0.0, -model.cables * STIFFNESS * np.sin(turn) * np.cos(turn)]
     np.testing.assert_allclose(R @ wrench[3:], expected, rtol=0.0, atol=1e-9 * STIFFNESS)
     np.testing.assert_allclose(wrench[:3], np.zeros(3), rtol=0.0, atol=1e-9 * STIFFNESS)

@@ -11,14 +11,14 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent, rest_of, start_from_mocap
 from rig_identification.estimate.momentum import balance, regress
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import Bench, model_at
+from rig_identification.estimate.prediction import Bench, drive, model_at
 from rig_identification.estimate.rest_evidence import coarsened
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import HOPELESS, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
 from rig_identification.model import layout, sensors
-from rig_identification.model.motion import State
+from rig_identification.model.motion import Input, State, on_cables, simulate
 
 Array = NDArray[np.float64]
 
@@ -110,8 +110,16 @@ def launch_state(
     """Start state of a run: within a fifth of the cables' length of rest, by its first second.
 
     noise (6, 6): random wrench, given where the body is not known yet. doubted: how far rig and devices may
-    be off, in tolerances (fit_start).
+    be off, in tolerances (fit_start). Cables that stretch begin stretched as far as rigid ones pull: from
+    elsewhere the body bounces, and a millimetre is a tonne.
     """
+    if np.any(bench.parameters.model.modes == layout.ELASTIC):
+        rigid = _rigid(bench)
+        near = launch_state(
+            rigid, run, theta, on_cables(model_at(rigid.parameters, theta), rest), noise, doubted
+        )
+        start = _stretched(bench, rigid, run, theta, near)
+        return _launched(bench, run, theta, start, noise, doubted, LAUNCHES)[0]
     start = rest
     if bench.mocap is not None:
         first = bench.parameters.places.mocap
@@ -122,6 +130,37 @@ def launch_state(
     if square > HOPELESS:
         closer = _launched(bench, run, theta, start, noise, doubted, CLOSER + LAUNCHES)
         state = closer[0] if closer[1] < square else state
+    return state
+
+
+def _rigid(bench: Bench) -> Bench:
+    """The bench with cables that do not stretch."""
+    model = bench.parameters.model
+    modes = np.where(model.modes == layout.ELASTIC, layout.RIGID, model.modes)
+    return replace(bench, parameters=replace(bench.parameters, model=replace(model, modes=modes)))
+
+
+def _stretched(bench: Bench, rigid: Bench, run: Run, theta: Array, state: State) -> State:
+    """The ``state`` of ``rigid`` cables moved by the least that stretches them as far as they pull there."""
+    driven = drive(run, rigid.parameters, theta)
+    first = Input(driven.step, driven.force[:1], driven.force_rate[:1], driven.wrench[:1])
+    motion = simulate(model_at(rigid.parameters, theta), state, first)
+    if not motion.complete:
+        return state
+    model = model_at(bench.parameters, theta)
+    cables = model.cable_numbers()
+    ceiling = cables[:, layout.CEILING_POINT : layout.CEILING_POINT + 3]
+    hinge = cables[:, layout.BODY_POINT : layout.BODY_POINT + 3]
+    pull = np.maximum(motion.outputs[0, layout.OUT_TENSION :], 0.0)
+    soft = model.modes == layout.ELASTIC
+    stretch = np.where(soft, pull / np.where(soft, cables[:, layout.AXIAL_STIFFNESS], 1.0), 0.0)
+    for _ in range(3):  # Newton's method from a millimetre away
+        along = state.position + hinge @ state.R_world_body.T - ceiling
+        length = np.linalg.norm(along, axis=1)
+        unit = along / length[:, None]
+        lines = np.concatenate([unit, np.cross(hinge, unit @ state.R_world_body)], axis=1)
+        move = np.linalg.lstsq(lines, cables[:, layout.LENGTH] * (1.0 + stretch) - length, rcond=None)[0]
+        state = state.moved(np.concatenate([move, np.zeros(model.states - move.size)]))
     return state
 
 

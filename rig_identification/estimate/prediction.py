@@ -14,6 +14,7 @@ from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.estimate.sampling import rate_noise
+from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
@@ -280,6 +281,7 @@ def linearise_run(
         directions=directions,
         start_basis=basis,
         substeps=substeps_for(model, run.grid.step, longest_step(run)),
+        threads=spare(),
     )
     if not motion.complete:
         return None

@@ -6,6 +6,7 @@ What takes the time holds no lock, and no task knows of another: however many co
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -16,6 +17,9 @@ Outcome = TypeVar("Outcome")
 #: Tasks at once at most: a handful of pieces share one memory.
 MOST = 8
 
+_lock = threading.Lock()
+_running = 0
+
 
 def cores() -> int:
     """Cores that this process may use, as far as tasks are put side by side on them."""
@@ -23,7 +27,26 @@ def cores() -> int:
     return min(MOST, usable)
 
 
+def spare() -> int:
+    """Cores for whoever asks, its own among them: those that no other task is on."""
+    return max(1, cores() - max(_running - 1, 0))
+
+
 def side_by_side(task: Callable[[Task], Outcome], over: Iterable[Task]) -> list[Outcome]:
     """Outcome of a task for each of several things, in their order."""
+
+    def counted(item: Task) -> Outcome:
+        _count(1)
+        try:
+            return task(item)
+        finally:
+            _count(-1)
+
     with ThreadPoolExecutor(max_workers=cores()) as pool:
-        return list(pool.map(task, over))
+        return list(pool.map(counted, over))
+
+
+def _count(change: int) -> None:
+    global _running
+    with _lock:
+        _running += change

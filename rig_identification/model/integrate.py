@@ -29,6 +29,7 @@ from rig_identification.model.dynamics import (
 )
 from rig_identification.model.effects.all import (
     add_effects,
+    add_effects_at,
     effects_follow,
     effects_reach,
     in_cable_rows,
@@ -140,6 +141,7 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
         d = directions[column]
         change = defect[:, states + column]
         reached = True
+        cable = -1
         if d == EXCITER_CLOCK or EXCITER_POSITION <= d < CABLES:
             add_exciter_number(physics, mount, d, force, force_rate, change)
             reached = rotor and d != EXCITER_CLOCK
@@ -160,15 +162,19 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
         pc[d] = complex(physics[d], STEP)
         Kc[:, :] = 0.0
         rc[:] = 0.0
-        if in_cable_rows(physics, modes, d):
-            # A ceiling's numbers and the softness of redundant cables
-            for i in range(n):
-                add_cable(pc, i, modes, xc, Rc, Kc, rc)
-        add_effects(pc, modes, xc, Rc, Kc, rc)
+        if cable >= 0:
+            add_effects_at(pc, modes, cable, xc, Rc, Kc, rc)
+        else:
+            if in_cable_rows(physics, modes, d):
+                # A ceiling's numbers and the softness of redundant cables
+                for i in range(n):
+                    add_cable(pc, i, modes, xc, Rc, Kc, rc)
+            add_effects(pc, modes, xc, Rc, Kc, rc)
         _add_defect(Kc, rc, z, change)
         if weighty or d == block + LINEAR_DENSITY:
             for i in range(n):
-                weight[i, states + column] = weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
+                if cable < 0 or i == cable:
+                    weight[i, states + column] = weight_below_cell(pc, block, modes, i, xc, Rc).imag / STEP
         pc[d] = physics[d]
     out[:, :] = 0.0
     for i in range(size):
@@ -364,29 +370,34 @@ def propagate(  # type: ignore[no-untyped-def]
     step,
     substeps,
     directions,
-    start_columns,
     sensitivity,
+    alike,
+    first,
+    end,
     nodes_x,
     nodes_R,
     nodes_out,
     A,
     B,
+    C,
     H,
     D,
-    J,
+    P,
 ):
-    """Integrate from node 0 to node N - 1, ``step`` seconds apart; returns nodes done (N: all went well).
+    """Integrate from node ``first`` to ``end`` of N, ``step`` s apart; returns nodes done (``end``: all).
 
-    x (12 + 2 s,) and reference (3, 3): start, destroyed; s: internal coordinates.
+    x (12 + 2 s,), reference (3, 3) and modes (n,): at node ``first``, and left as they are at ``end`` (N: the
+    last node's); s: internal coordinates. What is written of a node depends on nothing before it but these
+    three: stretches can be done side by side, and come out bit for bit as in one go, if what is passed over
+    without derivatives is done ``alike``: solved the way that derivatives ask for.
     forces, force_rates (N, 3): exciter force in its frame and its rate at the nodes, linear between;
     force_middles (N, 3): what the force has midway to the next node beyond that line (a parabola).
     wrenches (N, 6): further wrench,
     body axes, held over the interval. directions (d,): entries of ``physics`` to
-    differentiate in (EXCITER_CLOCK: clock). start_columns (X, b + d): derivative of the
-    start state, X = 12 + 2 s, in b start coordinates and the d directions.
-    Filled: nodes_x (N, X), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n); and where
-    ``sensitivity``: A (N, X, X), B (N, X, 6), H (N, OUT_TENSION + n, X), D (N, OUT_TENSION + n, 6), and
-    J (N, OUT_TENSION + n, b + d), total derivatives of the raw outputs.
+    differentiate in (EXCITER_CLOCK: clock).
+    Filled: nodes_x (N, X), nodes_R (N, 3, 3), nodes_out (N, OUT_TENSION + n), X = 12 + 2 s; and where
+    ``sensitivity``: A (N, X, X), B (N, X, 6), C (N, X, d), and the outputs' derivatives in state, wrench and
+    directions at their node, H (N, OUT_TENSION + n, X), D (N, OUT_TENSION + n, 6), P (N, OUT_TENSION + n, d).
     """
     nodes = forces.shape[0]
     n = modes.shape[0]
@@ -395,10 +406,9 @@ def propagate(  # type: ignore[no-untyped-def]
     size = 6 + n + internal
     d = directions.shape[0]
     local = states + WRENCH + d
-    starts = start_columns.shape[1] - d
     K = np.empty((size, size))
     r = np.empty(size)
-    inverse = np.empty((size if sensitivity else 0, size))
+    inverse = np.empty((size if sensitivity or alike else 0, size))
     z = np.empty(size)
     R = np.empty((3, 3))
     k = np.empty((4, states))
@@ -414,8 +424,7 @@ def propagate(  # type: ignore[no-untyped-def]
     stage = np.zeros((states, local if sensitivity else 0))
     slopes = np.empty((4, states, local if sensitivity else 0))
     out_columns = np.empty((OUT_TENSION + n, local if sensitivity else 0))
-    S = start_columns.copy()
-    for node in range(nodes):
+    for node in range(first, end):
         last = node == nodes - 1
         wrench = wrenches[node]
         if sensitivity:
@@ -452,9 +461,7 @@ def propagate(  # type: ignore[no-untyped-def]
                         _write_output_columns(physics, states, R, dz, directions, out_columns)
                         H[node] = out_columns[:, :states]
                         D[node] = out_columns[:, states : states + WRENCH]
-                        total = np.dot(np.ascontiguousarray(out_columns[:, :states]), S)
-                        total[:, starts:] += out_columns[:, states + WRENCH :]
-                        J[node] = total
+                        P[node] = out_columns[:, states + WRENCH :]
                     if last:
                         return nodes
                 rotation_rate(y, phi_rate)
@@ -494,6 +501,24 @@ def propagate(  # type: ignore[no-untyped-def]
         if sensitivity:
             A[node] = columns[:, :states]
             B[node] = columns[:, states : states + WRENCH]
-            S = np.dot(np.ascontiguousarray(columns[:, :states]), S)
-            S[:, starts:] += columns[:, states + WRENCH :]
-    return nodes
+            C[node] = columns[:, states + WRENCH :]
+    return end
+
+
+@njit(cache=True, nogil=True)
+def accumulate(start_columns, A, C, H, P):  # type: ignore[no-untyped-def]
+    """J (N, OUT_TENSION + n, b + d): total derivatives of the raw outputs at the nodes.
+
+    start_columns (X, b + d): derivative of the start state in b start coordinates and the d directions.
+    A, C, H, P: see :func:`propagate`.
+    """
+    nodes, outputs, d = P.shape
+    starts = start_columns.shape[1] - d
+    J = np.empty((nodes, outputs, starts + d))
+    S = start_columns.copy()
+    for node in range(nodes):
+        J[node] = np.dot(H[node], S)
+        J[node, :, starts:] += P[node]
+        S = np.dot(A[node], S)
+        S[:, starts:] += C[node]
+    return J

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from rig_identification.model import layout
-from rig_identification.model.body import linear_from_elements
+from rig_identification.model.body import linear_from_elements, tensor
 from rig_identification.model.constraints import project_columns, project_state
 from rig_identification.model.effects.internal import STOP_FREQUENCY
 from rig_identification.model.effects.place import (
@@ -21,7 +23,7 @@ from rig_identification.model.effects.place import (
     SHARING,
     internal_block,
 )
-from rig_identification.model.integrate import propagate
+from rig_identification.model.integrate import accumulate, propagate
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -50,6 +52,11 @@ class RigModel:
     def states(self) -> int:
         """Length of the local state."""
         return layout.BODY_STATE + 2 * self.internal
+
+    def cable_numbers(self) -> Array:
+        """(n, CABLE_SIZE) numbers of each cable, see layout.py."""
+        first = layout.cable_offset(0)
+        return self.physics[first : first + self.cables * layout.CABLE_SIZE].reshape(self.cables, -1)
 
     def with_internal(self, blocks: Array) -> RigModel:
         """The same rig with further internal coordinates. blocks (s, INTERNAL_SIZE): see layout.py.
@@ -82,9 +89,7 @@ def redundant(rig: Rig) -> bool:
     """Whether more cables hold the body than it takes: lines of force dependent near the design pose."""
     ceiling = np.array([c.ceiling_point for c in rig.cables])
     body = np.array([c.body_point for c in rig.cables])
-    drop = [0.0, 0.0, float(np.mean([c.length for c in rig.cables]))]
-    along = ceiling - body - np.mean(ceiling - body, axis=0) + drop
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along = _hanging(ceiling, body, np.array([c.length for c in rig.cables]))
     arm = body - np.mean(body, axis=0)
     lines = np.concatenate([along, np.cross(arm / max(float(np.max(np.abs(arm))), 1e-9), along)], axis=1)
     if lines.shape[0] > 6:
@@ -238,21 +243,49 @@ class Motion:
 FINE_STEP = 0.0034
 #: Longest step for fits: truncation of 1e-6 m, three orders below the sensors' noise.
 FIT_STEP = 0.005
+#: Longest step times the angular frequency of the body's fastest bounce on its cables: its frequency comes
+#: out within 2e-4, the cables' stiffness within 4e-4.
+RESOLVED = 0.4
+#: ... and times that of an internal coordinate.
+RESOLVED_INTERNAL = 0.5
 
 
 def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> int:
-    """Substeps no longer than ``longest`` that resolve the stiffest mode: omega h <= 0.5."""
-    plain = max(1, int(np.ceil(step / longest - 1e-9)), int(np.ceil(step * _fastest_internal(model) / 0.5)))
+    """Substeps no longer than ``longest`` that resolve the stiffest mode.
+
+    A Runge-Kutta step h slows a swing at angular frequency w by (w h)^4/120.
+    """
+    plain = max(
+        1,
+        int(np.ceil(step / longest - 1e-9)),
+        int(np.ceil(step * _fastest_internal(model) / RESOLVED_INTERNAL)),
+    )
     elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
     if not np.any(elastic):
         return plain
-    stiffness = 0.0
-    for i in np.flatnonzero(elastic):
-        o = layout.cable_offset(int(i))
-        stiffness += model.physics[o + layout.AXIAL_STIFFNESS] / model.physics[o + layout.LENGTH]
-    # Pitch and roll on the cables run faster than bounce by at most arm over gyration radius, about 2
-    omega = 2.0 * np.sqrt(stiffness / model.physics[layout.INERTIAL])
-    return max(plain, int(np.ceil(step * omega / 0.5)))
+    return max(plain, int(np.ceil(step * _bounce(model, elastic) / RESOLVED)))
+
+
+def _bounce(model: RigModel, elastic: NDArray[np.bool_]) -> float:
+    """Highest angular frequency (rad/s) of the body on its ``elastic`` cables, near the design pose."""
+    cables = model.cable_numbers()
+    body = cables[:, layout.BODY_POINT : layout.BODY_POINT + 3]
+    ceiling = cables[:, layout.CEILING_POINT : layout.CEILING_POINT + 3]
+    along = _hanging(ceiling, body, cables[:, layout.LENGTH])
+    lines = np.concatenate([along, np.cross(body, along)], axis=1)[elastic]
+    stiffness = (cables[:, layout.AXIAL_STIFFNESS] / cables[:, layout.LENGTH])[elastic]
+    inertial = model.physics[layout.INERTIAL : layout.INERTIAL + 10]
+    moment = np.cross(inertial[1:4], np.eye(3)).T  # of the columns of A: h x e_j
+    mass = np.block([[inertial[0] * np.eye(3), moment.T], [moment, tensor(inertial[4:])]])
+    squared = eigh(lines.T @ (stiffness[:, None] * lines), mass, eigvals_only=True)
+    return float(np.sqrt(max(float(squared[-1]), 0.0)))
+
+
+def _hanging(ceiling: Array, body: Array, lengths: Array) -> Array:
+    """(n, 3) unit vectors along cables near the design pose: the body level, under its ceiling points."""
+    drop = [0.0, 0.0, float(np.mean(lengths))]
+    along = ceiling - body - np.mean(ceiling - body, axis=0) + drop
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 
 
 def _fastest_internal(model: RigModel) -> float:
@@ -265,6 +298,13 @@ def _fastest_internal(model: RigModel) -> float:
     return fastest
 
 
+#: Nodes below which a motion is not worth two threads.
+WORTHWHILE = 200
+#: What a node costs without derivatives, as a share of one with those in state and wrench alone, and what
+#: each direction adds to the latter (measured: bench/forward_model.py).
+PLAIN_SHARE, DIRECTION_SHARE = 0.3, 0.03
+
+
 def simulate(
     model: RigModel,
     start: State,
@@ -273,12 +313,14 @@ def simulate(
     directions: NDArray[np.int64] | None = None,
     start_basis: Array | None = None,
     substeps: int | None = None,
+    threads: int = 1,
 ) -> Motion:
     """Motion from ``start`` under ``drive``; with derivatives where ``directions`` is given.
 
     directions (d,): entries of ``model.physics`` (or EXCITER_CLOCK). start_basis (12 + 2 s, b):
     directions of the start state, each a column; the start follows the cables where a
     direction of ``physics`` moves them. The start itself is put on the cables first.
+    threads: among which the derivatives are shared; they change no bit of the result.
     """
     sensitivity = directions is not None
     chosen = np.zeros(0, dtype=np.int64) if directions is None else np.asarray(directions, dtype=np.int64)
@@ -289,37 +331,122 @@ def simulate(
     columns = np.zeros((size, basis.shape[1] + chosen.size))
     columns[:, : basis.shape[1]] = basis
     project_columns(model.physics, model.modes, x, R, chosen, basis.shape[1], columns)
-    nodes, outputs = drive.force.shape[0], layout.OUT_TENSION + model.cables
-    kept = nodes if sensitivity else 0
-    states, rotations = np.zeros((nodes, size)), np.zeros((nodes, 3, 3))
-    out = np.zeros((nodes, outputs))
-    A, B = np.zeros((kept, size, size)), np.zeros((kept, size, 6))
-    H, D = np.zeros((kept, outputs, size)), np.zeros((kept, outputs, 6))
-    J = np.zeros((kept, outputs, columns.shape[1]))
-    done = propagate(
-        model.physics,
-        model.modes.copy(),
-        model.can_slacken,
-        model.exciter_orientation,
-        x,
-        R,
-        np.ascontiguousarray(drive.force),
-        np.ascontiguousarray(drive.force_rate),
-        np.zeros_like(drive.force) if drive.middle is None else np.ascontiguousarray(drive.middle),
-        np.ascontiguousarray(drive.wrench),
-        drive.step,
-        substeps or substeps_for(model, drive.step, FIT_STEP if sensitivity else FINE_STEP),
-        chosen,
-        columns,
-        sensitivity,
-        states,
-        rotations,
-        out,
-        A,
-        B,
-        H,
-        D,
-        J,
+    nodes = drive.force.shape[0]
+    if substeps is None:
+        substeps = substeps_for(model, drive.step, FIT_STEP if sensitivity else FINE_STEP)
+    walk = _Walk(model, drive, chosen, substeps)
+    cuts = _cuts(nodes, threads if sensitivity else 1, PLAIN_SHARE / (1.0 + DIRECTION_SHARE * chosen.size))
+    kept = _Kept.of(nodes, model, chosen.size, sensitivity)
+    done = walk.stretches(x, R, cuts, kept)
+    if not sensitivity:
+        return Motion(drive.step, kept.states, kept.R_world_body, kept.outputs, done)
+    J = accumulate(columns, kept.A, kept.C, kept.H, kept.P)
+    return Motion(
+        drive.step, kept.states, kept.R_world_body, kept.outputs, done, kept.A, kept.B, kept.H, kept.D, J
     )
-    derivatives = (A, B, H, D, J) if sensitivity else (None,) * 5
-    return Motion(drive.step, states, rotations, out, int(done), *derivatives)
+
+
+def _cuts(nodes: int, threads: int, plain: float) -> list[int]:
+    """Where to cut a motion so that all ``threads`` end together: each first walks to its own stretch.
+
+    plain: cost of a node without derivatives over that of one with them. Stretch j from m_j takes
+    plain m_j + (m_{j+1} - m_j) = T, so m_{j+1} = T + (1 - plain) m_j.
+    """
+    count = max(1, min(threads, nodes // WORTHWHILE))
+    reach = (1.0 - (1.0 - plain) ** np.arange(count + 1)) / plain
+    return [round(nodes * float(m / reach[-1])) for m in reach]
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What is kept of a motion's nodes: see integrate.propagate."""
+
+    states: Array
+    R_world_body: Array
+    outputs: Array
+    A: Array
+    B: Array
+    C: Array
+    H: Array
+    D: Array
+    P: Array
+
+    @classmethod
+    def of(cls, nodes: int, model: RigModel, directions: int, sensitivity: bool) -> _Kept:
+        """Room for so many nodes."""
+        size, outputs, kept = model.states, layout.OUT_TENSION + model.cables, nodes if sensitivity else 0
+        return cls(
+            np.zeros((nodes, size)),
+            np.zeros((nodes, 3, 3)),
+            np.zeros((nodes, outputs)),
+            np.zeros((kept, size, size)),
+            np.zeros((kept, size, 6)),
+            np.zeros((kept, size, directions)),
+            np.zeros((kept, outputs, size)),
+            np.zeros((kept, outputs, 6)),
+            np.zeros((kept, outputs, directions)),
+        )
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """A model under a drive, ready to be followed from any node to any other."""
+
+    model: RigModel
+    drive: Input
+    directions: NDArray[np.int64]
+    substeps: int
+
+    def stretches(self, x: Array, R: Array, cuts: list[int], kept: _Kept) -> int:
+        """Fill ``kept``, each stretch between two cuts in a thread of its own; the nodes done."""
+
+        def stretch(k: int) -> int:
+            own_x, own_R, modes = x.copy(), R.copy(), self.model.modes.copy()
+            if k and self._along(own_x, own_R, modes, 0, cuts[k], None) < cuts[k]:
+                return 0
+            return self._along(own_x, own_R, modes, cuts[k], cuts[k + 1], kept)
+
+        if len(cuts) == 2:
+            return stretch(0)
+        with ThreadPoolExecutor(len(cuts) - 1) as pool:
+            done = list(pool.map(stretch, range(len(cuts) - 1)))
+        short = (d for d, end in zip(done, cuts[1:], strict=True) if d < end)
+        return next(short, cuts[-1])
+
+    def _along(
+        self, x: Array, R: Array, modes: NDArray[np.int64], first: int, end: int, kept: _Kept | None
+    ) -> int:
+        """From node ``first`` to ``end``; x, R and modes go along. Keep nothing, or all there is room for."""
+        sensitivity = kept is not None and kept.A.shape[0] > 0
+        into = _Kept.of(end, self.model, 0, False) if kept is None else kept
+        drive = self.drive
+        return int(
+            propagate(
+                self.model.physics,
+                modes,
+                self.model.can_slacken,
+                self.model.exciter_orientation,
+                x,
+                R,
+                np.ascontiguousarray(drive.force),
+                np.ascontiguousarray(drive.force_rate),
+                np.zeros_like(drive.force) if drive.middle is None else np.ascontiguousarray(drive.middle),
+                np.ascontiguousarray(drive.wrench),
+                drive.step,
+                self.substeps,
+                self.directions,
+                sensitivity,
+                kept is None,
+                first,
+                end,
+                into.states,
+                into.R_world_body,
+                into.outputs,
+                into.A,
+                into.B,
+                into.C,
+                into.H,
+                into.D,
+                into.P,
+            )
+        )

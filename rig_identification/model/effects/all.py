@@ -1,4 +1,7 @@
-"""Every effect on the motion, called in turn: adding one is adding its file and its line here."""
+"""Every effect on the motion, called in turn: adding one is adding its file and its line here.
+
+What answers to the numbers of cables stands apart: of four cables, a number of one moves a quarter.
+"""
 
 from __future__ import annotations
 
@@ -100,18 +103,31 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     block = CABLES + CABLE_SIZE * modes.shape[0]
     if physics.shape[0] <= block:
         return
-    add_hinge_damping(physics, block, modes, x, R, r)
-    add_hinge_friction(physics, block, modes, x, R, r)
-    add_hinge_bending(physics, block, modes, x, R, r)
-    add_hinge_roll(physics, block, modes, x, R, r)
-    add_cable_torsion(physics, block, modes, x, R, r)
+    _add_at_cables(physics, block, modes, (0, modes.shape[0]), x, R, K, r)
     add_air_drag(physics, block, x, R, r)
     add_air_plates(physics, block, x, R, r)
     add_turning_cube(physics, block, R, r)
     add_air_added_mass(physics, block, x, K, r)
     add_exciter_rotor(physics, block, x, R, K, r)
     add_gyroscopic_share(physics, block, x, r)
-    add_cable_mass(physics, block, modes, x, R, K, r)
     add_tether(physics, block, x, R, r)
     add_point_law(physics, block, x, R, r)
     add_internal(physics, block, modes, x, R, K, r)
+
+
+@njit(cache=True)
+def add_effects_at(physics, modes, cable, x, R, K, r):  # type: ignore[no-untyped-def]
+    """Add to K z = r what of all effects answers to one cable's numbers."""
+    block = CABLES + CABLE_SIZE * modes.shape[0]
+    _add_at_cables(physics, block, modes, (cable, cable + 1), x, R, K, r)
+
+
+@njit(cache=True)
+def _add_at_cables(physics, block, modes, cables, x, R, K, r):  # type: ignore[no-untyped-def]
+    """Add what acts at some cables, first to last but one; at all where one cable's share asks for all."""
+    add_hinge_damping(physics, block, modes, cables, x, R, r)
+    add_hinge_friction(physics, block, modes, cables, x, R, r)
+    add_hinge_bending(physics, block, modes, cables, x, R, r)
+    add_hinge_roll(physics, block, modes, x, R, r)
+    add_cable_torsion(physics, block, modes, cables, x, R, r)
+    add_cable_mass(physics, block, modes, cables, x, R, K, r)

@@ -29,8 +29,8 @@ from rig_identification.model.layout import (
 
 
 @njit(cache=True)
-def add_cable_mass(physics, block, modes, x, R, K, r):  # type: ignore[no-untyped-def]
-    """Add weight and inertia of the cables across themselves to K and r."""
+def add_cable_mass(physics, block, modes, cables, x, R, K, r):  # type: ignore[no-untyped-def]
+    """Add weight and inertia of some cables across themselves to K and r."""
     density = physics[block + LINEAR_DENSITY]
     if not active(density):
         return
@@ -39,7 +39,7 @@ def add_cable_mass(physics, block, modes, x, R, K, r):  # type: ignore[no-untype
     gx = R[0, 0] * g0 + R[1, 0] * g1 + R[2, 0] * g2
     gy = R[0, 1] * g0 + R[1, 1] * g1 + R[2, 1] * g2
     gz = R[0, 2] * g0 + R[1, 2] * g1 + R[2, 2] * g2
-    for i in range(modes.shape[0]):
+    for i in range(cables[0], cables[1]):
         if modes[i] == SLACK:
             continue
         o = CABLES + CABLE_SIZE * i

@@ -21,8 +21,8 @@ from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, SLAC
 
 
 @njit(cache=True)
-def add_cable_torsion(physics, block, modes, x, R, r):  # type: ignore[no-untyped-def]
-    """Add the wrench of twisted cables to r, in body axes: there A is R_0^T R."""
+def add_cable_torsion(physics, block, modes, cables, x, R, r):  # type: ignore[no-untyped-def]
+    """Add the wrench of some twisted cables to r, in body axes: there A is R_0^T R."""
     stiffness = physics[block + TORSION]
     if not active(stiffness):
         return
@@ -39,7 +39,7 @@ def add_cable_torsion(physics, block, modes, x, R, r):  # type: ignore[no-untype
     a22 = rest[0, 2] * R[0, 2] + rest[1, 2] * R[1, 2] + rest[2, 2] * R[2, 2]
     wx, wy, wz = 0.5 * (a21 - a12), 0.5 * (a02 - a20), 0.5 * (a10 - a01)
     trace = a00 + a11 + a22
-    for i in range(modes.shape[0]):
+    for i in range(cables[0], cables[1]):
         if modes[i] == SLACK:
             continue
         o = CABLES + CABLE_SIZE * i

@@ -12,8 +12,10 @@ from rig_identification.model.effects.place import BENDING, CREEP, active
 
 
 @njit(cache=True)
-def add_hinge_bending(physics, block, modes, x, R, r):  # type: ignore[no-untyped-def]
-    """Add the force and moment of hinges that resist being bent to r."""
+def add_hinge_bending(physics, block, modes, cables, x, R, r):  # type: ignore[no-untyped-def]
+    """Add the force and moment of some cables' hinges that resist being bent to r."""
     damping = physics[block + BENDING]
     if active(damping):
-        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, physics[block + CREEP], 0.0, r)
+        add_hinge_moments(
+            physics, modes, cables, x, R, damping, 0.0 * damping, physics[block + CREEP], 0.0, r
+        )

@@ -16,8 +16,10 @@ from rig_identification.model.effects.place import CREEP, DAMPING, active
 
 
 @njit(cache=True)
-def add_hinge_damping(physics, block, modes, x, R, r):  # type: ignore[no-untyped-def]
-    """Add the force and moment of viscous hinges to r."""
+def add_hinge_damping(physics, block, modes, cables, x, R, r):  # type: ignore[no-untyped-def]
+    """Add the force and moment of some cables' viscous hinges to r."""
     damping = physics[block + DAMPING]
     if active(damping):
-        add_hinge_moments(physics, modes, x, R, damping, 0.0 * damping, physics[block + CREEP], 1.0, r)
+        add_hinge_moments(
+            physics, modes, cables, x, R, damping, 0.0 * damping, physics[block + CREEP], 1.0, r
+        )

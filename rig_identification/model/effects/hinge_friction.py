@@ -9,8 +9,8 @@ from rig_identification.model.effects.place import CREEP, FRICTION, active
 
 
 @njit(cache=True)
-def add_hinge_friction(physics, block, modes, x, R, r):  # type: ignore[no-untyped-def]
-    """Add the force and moment of rubbing hinges to r."""
+def add_hinge_friction(physics, block, modes, cables, x, R, r):  # type: ignore[no-untyped-def]
+    """Add the force and moment of some cables' rubbing hinges to r."""
     torque = physics[block + FRICTION]
     if active(torque):
-        add_hinge_moments(physics, modes, x, R, 0.0 * torque, torque, physics[block + CREEP], 1.0, r)
+        add_hinge_moments(physics, modes, cables, x, R, 0.0 * torque, torque, physics[block + CREEP], 1.0, r)

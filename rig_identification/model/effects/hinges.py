@@ -23,9 +23,10 @@ def _law(viscous, rubbing, creep, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def add_hinge_moments(physics, modes, x, R, viscous, rubbing, creep, twist, r):  # type: ignore[no-untyped-def]
-    """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in every hinge.
+def add_hinge_moments(physics, modes, cables, x, R, viscous, rubbing, creep, twist, r):  # type: ignore[no-untyped-def]
+    """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in the hinges of some cables.
 
+    cables: first and last but one of them, as in range().
     creep (rad/s): rate below which rubbing grows with the rate instead of jumping, as dry bearings do.
     twist: 1 where a hinge resists being twisted as it resists being bent, 0 where it twists freely.
     """
@@ -34,7 +35,7 @@ def add_hinge_moments(physics, modes, x, R, viscous, rubbing, creep, twist, r): 
     vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
     vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2
     vz = R[0, 2] * v0 + R[1, 2] * v1 + R[2, 2] * v2
-    for i in range(modes.shape[0]):
+    for i in range(cables[0], cables[1]):
         if modes[i] == SLACK:
             continue
         o = CABLES + CABLE_SIZE * i
