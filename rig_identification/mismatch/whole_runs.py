@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -43,6 +44,8 @@ def _fitted_whole(
     point = replace(known, theta=carried(whole, here, known).theta)
     curved = any(t.candidate.curved for t in found)
     fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
+    if not curved and strayed(fitted) and not search.budget.spent():
+        fitted = _along_what_happened(ideal.fitted, fitted, search.budget.late)
     if not as_found:
         # What says most comes first, whatever was found first. Without its effect an error goes to its bound
         bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
@@ -70,6 +73,31 @@ def _fitted_whole(
     return Explained(
         fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace, search.bodies
     )
+
+
+def strayed(fitted: Fitted) -> bool:
+    """Whether the fitted runs are noise and a held-out one asks for parameters that they exclude by far.
+
+    What lacks something shows in the fitted runs as well: this is another valley than the recordings'.
+    """
+    heard, own = hear(fitted), {run.recording.name for run in fitted.problem.runs}
+    loud = any(w.recording in own and heard.unlikely(w.band.log10_p) for w in heard.witnesses)
+    return heard.contradicted and not loud
+
+
+def _along_what_happened(ideal: Fitted, fitted: Fitted, stop: Callable[[], bool]) -> Fitted:
+    """The fit begun anew by way of what happened; as it was where that leads nowhere better.
+
+    Undisturbed, a body that rubs to a halt answers so sharply that a fit stays where it began.
+    """
+    whole = fitted.problem
+    about = fit_whole(ideal, whole, whole, _undisturbed(fitted), stop, curved=True)
+    again = fit_whole(ideal, whole, whole, _undisturbed(about), stop)
+    return again if again.evaluation.cost < fitted.evaluation.cost else fitted
+
+
+def _undisturbed(fitted: Fitted) -> Point:
+    return replace(fitted.evaluation.point, latents=())
 
 
 def as_fitted(fitted: Fitted, trial: Trial) -> Trial:
