@@ -27,12 +27,14 @@ from rig_identification.model.effects.place import (
     EFFECTS_SIZE,
     FRICTION,
     GYROSCOPIC_SHARE,
+    LAW_SPRING,
     LINEAR_DENSITY,
     PLATES,
     ROLL_STIFFNESS,
     ROTOR_MASS,
     SHARING,
     TETHER_POINT,
+    TETHER_STIFFNESS,
     TORSION,
     TURNING_CUBE,
     active,
@@ -40,7 +42,7 @@ from rig_identification.model.effects.place import (
 from rig_identification.model.effects.point_law import add_point_law
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.effects.turning_cube import add_turning_cube
-from rig_identification.model.layout import CABLE_SIZE, CABLES, CEILING, INTERNAL_SIZE, KIND
+from rig_identification.model.layout import BODY_STATE, CABLE_SIZE, CABLES, CEILING, INTERNAL_SIZE, KIND
 
 
 @njit(cache=True)
@@ -104,15 +106,24 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     if physics.shape[0] <= block:
         return
     _add_at_cables(physics, block, modes, (0, modes.shape[0]), x, R, K, r)
-    add_air_drag(physics, block, x, R, r)
-    add_air_plates(physics, block, x, R, r)
-    add_turning_cube(physics, block, R, r)
-    add_air_added_mass(physics, block, x, K, r)
-    add_exciter_rotor(physics, block, x, R, K, r)
-    add_gyroscopic_share(physics, block, x, r)
-    add_tether(physics, block, x, R, r)
-    add_point_law(physics, block, x, R, r)
-    add_internal(physics, block, modes, x, R, K, r)
+    if active(physics[block + DRAG_AREA]):
+        add_air_drag(physics, block, x, R, r)
+    if _any_active(physics, block + PLATES, 2):
+        add_air_plates(physics, block, x, R, r)
+    if active(physics[block + TURNING_CUBE]):
+        add_turning_cube(physics, block, R, r)
+    if active(physics[block + ADDED_MASS]):
+        add_air_added_mass(physics, block, x, K, r)
+    if active(physics[block + ROTOR_MASS]):
+        add_exciter_rotor(physics, block, x, R, K, r)
+    if active(physics[block + GYROSCOPIC_SHARE]):
+        add_gyroscopic_share(physics, block, x, r)
+    if _any_active(physics, block + TETHER_STIFFNESS, 6):
+        add_tether(physics, block, x, R, r)
+    if _any_active(physics, block + LAW_SPRING, 5):
+        add_point_law(physics, block, x, R, r)
+    if x.shape[0] > BODY_STATE:
+        add_internal(physics, block, modes, x, R, K, r)
 
 
 @njit(cache=True)
@@ -125,9 +136,24 @@ def add_effects_at(physics, modes, cable, x, R, K, r):  # type: ignore[no-untype
 @njit(cache=True)
 def _add_at_cables(physics, block, modes, cables, x, R, K, r):  # type: ignore[no-untyped-def]
     """Add what acts at some cables, first to last but one; at all where one cable's share asks for all."""
-    add_hinge_damping(physics, block, modes, cables, x, R, r)
-    add_hinge_friction(physics, block, modes, cables, x, R, r)
-    add_hinge_bending(physics, block, modes, cables, x, R, r)
-    add_hinge_roll(physics, block, modes, x, R, r)
-    add_cable_torsion(physics, block, modes, cables, x, R, r)
-    add_cable_mass(physics, block, modes, cables, x, R, K, r)
+    if active(physics[block + DAMPING]):
+        add_hinge_damping(physics, block, modes, cables, x, R, r)
+    if active(physics[block + FRICTION]):
+        add_hinge_friction(physics, block, modes, cables, x, R, r)
+    if active(physics[block + BENDING]):
+        add_hinge_bending(physics, block, modes, cables, x, R, r)
+    if active(physics[block + ROLL_STIFFNESS]):
+        add_hinge_roll(physics, block, modes, x, R, r)
+    if active(physics[block + TORSION]):
+        add_cable_torsion(physics, block, modes, cables, x, R, r)
+    if active(physics[block + LINEAR_DENSITY]):
+        add_cable_mass(physics, block, modes, cables, x, R, K, r)
+
+
+@njit(cache=True, inline="always")
+def _any_active(physics, first, count):  # type: ignore[no-untyped-def]
+    """Whether any of so many numbers, or its derivative, is asked for."""
+    found = False
+    for i in range(first, first + count):
+        found = found or active(physics[i])
+    return found
