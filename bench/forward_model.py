@@ -117,10 +117,14 @@ def report(seconds: float, repeats: int, reference_seconds: float) -> None:
     def forward() -> Motion:
         return simulate(model, start, drive)
 
-    def jacobian() -> Motion:
-        return simulate(model, start, drive, directions=directions)
+    def jacobian(threads: int = 1, directions: NDArray[np.int64] = directions) -> Motion:
+        return simulate(model, start, drive, directions=directions, threads=threads)
+
+    def state_only() -> Motion:
+        return jacobian(directions=directions[:0])
 
     forward_s, jacobian_s = best_of(repeats, forward), best_of(repeats, jacobian)
+    shared_s, state_s = best_of(repeats, lambda: jacobian(2)), best_of(repeats, state_only)
     begin = time.perf_counter()
     reference = by_scipy(model, start, reference_seconds)
     scipy_s = (time.perf_counter() - begin) * seconds / reference_seconds
@@ -129,6 +133,8 @@ def report(seconds: float, repeats: int, reference_seconds: float) -> None:
     print(f"{seconds:.0f} s at {1.0 / STEP:.0f} Hz, {model.cables} cables, best of {repeats}, one core")
     print(f"forward           {forward_s:8.3f} s   goal {FORWARD_GOAL * scale:.2f} s")
     print(f"12-column Jacobian{jacobian_s:8.3f} s   goal {JACOBIAN_GOAL * scale:.2f} s")
+    print(f"  by two threads  {shared_s:8.3f} s")
+    print(f"  in state alone  {state_s:8.3f} s")
     print(f"scipy DOP853      {scipy_s:8.3f} s   (scaled up from {reference_seconds:.0f} s)")
     print(f"forward is {scipy_s / forward_s:.0f} times as fast as DOP853; positions agree to {apart:.1e} m")
 

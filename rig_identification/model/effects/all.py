@@ -1,6 +1,7 @@
-"""Every effect on the motion, called in turn: adding one is adding its file and its line here.
+"""Every effect on the motion, called in turn: adding one is adding its file and its lines here.
 
-What answers to the numbers of cables stands apart: of four cables, a number of one moves a quarter.
+What answers to the numbers of cables stands apart: of four cables, a number of one moves a quarter. Whether
+an effect is there is asked before it is called as well: the call alone costs more than the question.
 """
 
 from __future__ import annotations
