@@ -61,8 +61,8 @@ def slope_of(model: RigModel) -> Callable[[float, Array], Array]:
     inertia = np.zeros((3, 3))
     inertia[np.triu_indices(3)] = inertial[4:]
     inertia = inertia + np.triu(inertia, 1).T
-    blocks = model.physics[layout.CABLES : layout.effects_offset(model.cables)].reshape(-1, layout.CABLE_SIZE)
-    ceiling, hinges, n = blocks[:, 0:3], blocks[:, 3:6], model.cables
+    cables = model.cable_numbers()
+    ceiling, hinges, n = cables[:, 0:3], cables[:, 3:6], model.cables
     skew = np.array([[0.0, -h[2], h[1]], [h[2], 0.0, -h[0]], [-h[1], h[0], 0.0]])
     K = np.zeros((6 + n, 6 + n))
     K[:3, :3], K[:3, 3:6], K[3:6, :3], K[3:6, 3:6] = mass * np.eye(3), -skew, skew, inertia

@@ -13,7 +13,6 @@ from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
 from test_model_rigs import (
     Sample,
-    cable_blocks,
     cable_lengths,
     moving,
     random_sample,
@@ -44,7 +43,7 @@ def kinetic_and_potential(model: RigModel, motion: Motion) -> tuple[Array, Array
     kinetic = 0.5 * mass * np.sum(velocity**2, axis=1) + 0.5 * np.einsum("ni,ij,nj->n", w, J, w)
     potential = -mass * (x + R @ center) @ gravity
     unloaded = unloaded_lengths(model)
-    stiffness = cable_blocks(model)[:, layout.AXIAL_STIFFNESS]
+    stiffness = model.cable_numbers()[:, layout.AXIAL_STIFFNESS]
     stretch = cable_lengths(model, x, R) - unloaded
     return kinetic, potential + 0.5 * np.sum(stiffness / unloaded * stretch**2, axis=1)
 
@@ -109,7 +108,7 @@ def forces_on(model: RigModel, motion: Motion, force: Array) -> tuple[Array, Arr
     R, x = motion.R_world_body, motion.states[:, :3]
     total = np.tile(mass * gravity, (x.shape[0], 1))
     moment = np.cross(x + R @ center, total)
-    for i, block in enumerate(cable_blocks(model)):
+    for i, block in enumerate(model.cable_numbers()):
         hinge = x + R @ block[3:6]
         along = block[0:3] - hinge
         pull = motion.outputs[:, layout.OUT_TENSION + i, None] * along

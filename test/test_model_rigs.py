@@ -129,21 +129,16 @@ def moving(sample: Sample, model: RigModel, seed: int) -> State:
     return on_cables(model, state)
 
 
-def cable_blocks(model: RigModel) -> Array:
-    """(n, CABLE_SIZE) entries of each cable."""
-    return model.physics[layout.CABLES : layout.effects_offset(model.cables)].reshape(-1, layout.CABLE_SIZE)
-
-
 def cable_lengths(model: RigModel, position: Array, R: Array) -> Array:
     """(N, n) m of poses (N, 3), (N, 3, 3), by the law of Pythagoras alone."""
-    blocks = cable_blocks(model)
+    blocks = model.cable_numbers()
     hinges = position[:, None, :] + np.einsum("nij,cj->nci", R, blocks[:, 3:6])
     return np.asarray(np.linalg.norm(hinges - blocks[:, 0:3], axis=2))
 
 
 def unloaded_lengths(model: RigModel) -> Array:
     """(n,) m."""
-    return np.asarray(cable_blocks(model)[:, layout.LENGTH])
+    return np.asarray(model.cable_numbers()[:, layout.LENGTH])
 
 
 @pytest.mark.parametrize("cables", [2, 3, 4, 5, 6])

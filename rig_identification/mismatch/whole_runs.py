@@ -44,13 +44,14 @@ def _fitted_whole(
     point = replace(known, theta=carried(whole, here, known).theta)
     curved = any(t.candidate.curved for t in found)
     fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
-    if not curved and strayed(fitted) and not search.budget.spent():
+    after, verdict = judged(fitted)
+    if verdict.verdict != "none" and not curved and not search.budget.spent() and strayed(fitted):
         fitted = _along_what_happened(ideal.fitted, fitted, search.budget.late)
+        after, verdict = judged(fitted)
     if not as_found:
         # What says most comes first, whatever was found first. Without its effect an error goes to its bound
         bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
         found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
-    after, verdict = judged(fitted)
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
     # a held-out run that cannot be followed, of which there is no residual to hear
     trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None and not fitted.lost

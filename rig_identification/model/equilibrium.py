@@ -120,12 +120,10 @@ class Rest:
 
 def design_pose(model: RigModel) -> State:
     """A pose near the cables' lengths, the body upright below the ceiling: where :func:`find_rest` starts."""
-    n = model.cables
-    blocks = [
-        model.physics[layout.cable_offset(i) : layout.cable_offset(i) + layout.CABLE_SIZE] for i in range(n)
-    ]
-    ceiling, body = np.array([b[0:3] for b in blocks]), np.array([b[3:6] for b in blocks])
-    length = np.array([b[layout.LENGTH] for b in blocks])
+    cables = model.cable_numbers()
+    ceiling = cables[:, layout.CEILING_POINT : layout.CEILING_POINT + 3]
+    body = cables[:, layout.BODY_POINT : layout.BODY_POINT + 3]
+    length = cables[:, layout.LENGTH]
     below = np.mean(ceiling - body, axis=0) - [0.0, 0.0, np.mean(length)]
 
     def defect(q: Array) -> Array:

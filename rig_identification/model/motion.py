@@ -24,6 +24,7 @@ from rig_identification.model.effects.place import (
     internal_block,
 )
 from rig_identification.model.integrate import accumulate, propagate
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -275,7 +276,7 @@ def _bounce(model: RigModel, elastic: NDArray[np.bool_]) -> float:
     lines = np.concatenate([along, np.cross(body, along)], axis=1)[elastic]
     stiffness = (cables[:, layout.AXIAL_STIFFNESS] / cables[:, layout.LENGTH])[elastic]
     inertial = model.physics[layout.INERTIAL : layout.INERTIAL + 10]
-    moment = np.cross(inertial[1:4], np.eye(3)).T  # of the columns of A: h x e_j
+    moment = skew(inertial[1:4])  # h x A
     mass = np.block([[inertial[0] * np.eye(3), moment.T], [moment, tensor(inertial[4:])]])
     squared = eigh(lines.T @ (stiffness[:, None] * lines), mass, eigvals_only=True)
     return float(np.sqrt(max(float(squared[-1]), 0.0)))
