@@ -11,6 +11,7 @@ from test_estimate_prediction import recorded, vector_of
 from test_model_rigs import random_sample
 
 from rig_identification.estimate import solve as fitting
+from rig_identification.estimate.box import in_box
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import (
@@ -18,7 +19,6 @@ from rig_identification.estimate.solve import (
     Point,
     Problem,
     _bounded_step,
-    _in_box,
     _moved,
     _pulled_back,
     evaluate,
@@ -129,7 +129,7 @@ def test_a_quadratic_in_a_box_is_minimised() -> None:
             matrix = root @ root.T + 1e-3 * np.eye(size)
             right = matrix @ rng.normal(scale=3.0, size=size)
             low, high = -rng.uniform(0.1, 2.0, size), rng.uniform(0.1, 2.0, size)
-            x = _in_box(matrix, right, low, high)
+            x = in_box(matrix, right, low, high)
             assert np.all((x >= low) & (x <= high))
             known = lsq_linear(
                 np.linalg.cholesky(matrix).T,

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.optimize import lsq_linear
 
+from rig_identification.estimate.box import in_box
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.prediction import (
@@ -227,7 +226,7 @@ def _step_within_bounds(
     change = change.copy()
     change[open_] = np.linalg.solve(inside, right)
     limit = np.full(change.size, np.inf)
-    limit[INERTIAL:p] = [_limit(problem, q) for q in problem.bench.parameters.free]
+    limit[INERTIAL:p] = [limit_of(problem, q) for q in problem.bench.parameters.free]
     here = np.zeros(change.size)
     here[:p] = current.point.theta
     if np.all(np.abs(here + change)[open_] <= limit[open_] + 1e-9):
@@ -239,7 +238,7 @@ def _step_within_bounds(
         inside[np.ix_(outer, outer)], np.concatenate([across, right[outer, None]], axis=1)
     )
     box, middle = limit[open_][inner], here[open_][inner]
-    step = _in_box(
+    step = in_box(
         inside[np.ix_(inner, inner)] - across.T @ solved[:, :-1],
         right[inner] - across.T @ solved[:, -1],
         -box - middle,
@@ -248,38 +247,6 @@ def _step_within_bounds(
     change[open_[inner]] = step
     change[open_[outer]] = solved[:, -1] - solved[:, :-1] @ step
     return change
-
-
-#: Rounds in which all that is on the wrong side changes sides at once, and what counts as zero there.
-PIVOTS, BARELY = 20, 1e-9
-
-
-def _in_box(matrix: Array, right: Array, low: Array, high: Array) -> Array:
-    """The x (n,) in [low, high] that minimises x^T matrix x / 2 - right^T x; matrix (n, n) positive definite.
-
-    Block principal pivoting: what passes a bound goes onto it, what is pressed inwards from one comes free
-    (Portugal, Judice and Vicente, "A comparison of block pivoting and interior-point algorithms for linear
-    least squares problems with nonnegative variables", 1994). It ends after a few rounds, or hardly ever does
-    not; bounded-variable least squares then, which is certain and slow (Stark and Parker, 1995).
-    """
-    side = np.zeros(right.size, dtype=np.int64)  # -1 at low, 1 at high
-    scale = np.sqrt(np.diag(matrix))
-    for _ in range(PIVOTS):
-        x = np.where(side < 0, low, high)
-        free = side == 0
-        held = ~free
-        x[free] = np.linalg.solve(
-            matrix[np.ix_(free, free)], right[free] - matrix[np.ix_(free, held)] @ x[held]
-        )
-        pull = (right - matrix @ x) / scale
-        over, under = free & (x * scale > high * scale + BARELY), free & (x * scale < low * scale - BARELY)
-        loose = held & (side * pull < -BARELY * np.max(np.abs(right / scale)))
-        if not np.any(over | under | loose):
-            return np.clip(x, low, high)
-        side = np.where(over, 1, np.where(under, -1, np.where(loose, 0, side)))
-    root = np.linalg.cholesky(matrix)
-    target = solve_triangular(root, right, lower=True)
-    return np.asarray(np.clip(lsq_linear(root.T, target, (low, high), method="bvls").x, low, high))
 
 
 #: Share of what a step promises that it keeps at least once it is pulled back: where it does not it is too
@@ -314,7 +281,7 @@ def _pulled_back(
 WIDEST = 3.0
 
 
-def _limit(problem: Problem, parameter: Parameter) -> float:
+def limit_of(problem: Problem, parameter: Parameter) -> float:
     """Std of its prior that a free parameter stays within."""
     if parameter.ratio:
         return WIDEST

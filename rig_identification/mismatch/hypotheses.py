@@ -101,15 +101,18 @@ def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) 
     """
     single = max((net_gain(p, count) for p in promises if not p.steady), default=0.0)
     worthy = [p for p in promises if net_gain(p, count) > (max(single, 0.0) if p.steady else 0.0)]
+    # A cell that bends, or that feels its neighbour, promises whatever its zero does, and a little more
+    worthy.sort(key=lambda p: -net_gain(p, count))
+    most = max((p.gain for p in worthy), default=0.0)
     if device is not None:
         worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
     out: list[Promise] = []
     for p in worthy:
         alike = sum(q.candidate.kind == p.candidate.kind for q in out)
-        most = ALIKE_IF_MANY if p.candidate.many else ALIKE
+        places = ALIKE_IF_MANY if p.candidate.many else ALIKE
         # A hose's nine numbers promise more of anything, and take no place from what is fitted in a second
         others = out if p.candidate.slow else [q for q in out if not q.candidate.slow]
-        if p.gain > WORTH * worthy[0].gain and alike < most and len(others) < FITTED:
+        if p.gain > WORTH * most and alike < places and len(others) < FITTED:
             out.append(p)
     return out
 

@@ -19,6 +19,7 @@ from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.beyond import Beyond, Columns
+from rig_identification.mismatch.boxed import Boxed
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.rider_places import Ridden, finer, scanned, spread_of
@@ -104,10 +105,10 @@ def screen(
     opened = _opened(problem, evaluation, [*candidates, *probes])
     if opened is None:
         return []
-    wide, point, beyond = opened
+    wide, beyond, boxed = opened
     full, base = beyond.full, beyond.base
-    out = [_promise(wide, point, beyond, c) for c in candidates]
-    for probe in (_promise(wide, point, beyond, c) for c in probes):
+    out = [_promise(wide, beyond, boxed, c) for c in candidates]
+    for probe in (_promise(wide, beyond, boxed, c) for c in probes):
         out += _supports(problem, mass, probe)
     placed = [
         Promise(hose, gain, values, steady=steady)
@@ -123,7 +124,7 @@ def screen(
 
 def _opened(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
-) -> tuple[Problem, Point, Beyond] | None:
+) -> tuple[Problem, Beyond, Boxed] | None:
     """The problem with what candidates add among its unknowns, and all that is free without it."""
     wide = _adding(problem, candidates)
     point = carried(wide, problem, evaluation.point)
@@ -133,7 +134,8 @@ def _opened(
     added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
     probed = wide.bench.parameters.model.states - problem.bench.parameters.model.states
     base = free_without(wide, point, full, added, probed)
-    return wide, point, Beyond(full, base, wide.bench.parameters.size)
+    asked = {q.name for c in candidates for q in c.parameters}
+    return wide, Beyond(full, base, wide.bench.parameters.size), Boxed(wide, full, added, probed, asked)
 
 
 def promises_of(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]) -> list[Promise]:
@@ -179,36 +181,11 @@ def free_without(
     return np.flatnonzero(~at_bound)
 
 
-def _promise(wide: Problem, point: Point, beyond: Beyond, candidate: Candidate) -> Promise:
-    full, base = beyond.full, beyond.base
-    free = wide.bench.parameters.free
-    column = {q.name: INERTIAL + i for i, q in enumerate(free)}
-    information, gradient = full.information.copy(), full.gradient.copy()
-    chosen = []
-    for q in candidate.parameters:
-        i = column[q.name]
-        chosen.append(i)
-        ratio = free[i - INERTIAL].prior_std / q.prior_std
-        # Replace the prior: precision 1 in the old units becomes ratio^2
-        information[i, i] += ratio**2 - 1.0
-        gradient[i] += point.theta[i] * (1.0 - ratio**2)
-    step = np.zeros(information.shape[0])
-    while True:
-        index = np.unique(np.concatenate([base, np.array(chosen, dtype=base.dtype)]))
-        step[:] = 0.0
-        step[index] = _solve(information[np.ix_(index, index)], gradient[index])
-        wrong = [
-            column[q.name]
-            for q in candidate.parameters[: candidate.positive]
-            if column[q.name] in chosen and point.theta[column[q.name]] + step[column[q.name]] < 0.0
-        ]
-        if not wrong:
-            break
-        # What cannot be negative promises nothing by being so
-        chosen = [i for i in chosen if i not in wrong]
-    gain = 0.5 * float(step[index] @ gradient[index]) - _gain(full.information, full.gradient, base)
-    values = {q.name: free[i - INERTIAL].value(point.theta[i] + step[i]) for q, i in _with(candidate, column)}
-    return Promise(candidate, gain, values, charge=_charge(wide, beyond, candidate))
+def _promise(wide: Problem, beyond: Beyond, boxed: Boxed, candidate: Candidate) -> Promise:
+    free = {q.name: q for q in wide.bench.parameters.free}
+    step = boxed.step(candidate.parameters, candidate.positive)
+    values = {q.name: free[q.name].value(z) for q, z in zip(candidate.parameters, step.values, strict=True)}
+    return Promise(candidate, step.gain, values, charge=_charge(wide, beyond, candidate))
 
 
 def _charge(wide: Problem, beyond: Beyond, candidate: Candidate) -> float | None:
@@ -234,10 +211,6 @@ def _charge(wide: Problem, beyond: Beyond, candidate: Candidate) -> float | None
         before = float(after)
         sign, after = np.linalg.slogdet(np.outer(wider, wider) * (believed - one) + one)
     return 0.5 * float(after - before) if sign > 0 else None
-
-
-def _with(candidate: Candidate, column: dict[str, int]):  # type: ignore[no-untyped-def]
-    return [(q, column[q.name]) for q in candidate.parameters]
 
 
 def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
