@@ -54,7 +54,7 @@ def first_of_two(
     single = max(promises, key=lambda p: net_gain(p, count), default=None)
     alone = 0.0 if single is None else net_gain(single, count)
     likely = {p.candidate.label: p for p in promises if not p.candidate.slow and p.candidate.settle is None}
-    plain = list(likely.values())[:PAIRED]
+    plain = sorted(likely.values(), key=lambda p: -net_gain(p, count))[:PAIRED]
     pairs = [
         (a.candidate, b.candidate)
         for a, b in combinations(plain, 2)

@@ -87,6 +87,8 @@ def trials(
         problem, evaluation, here, seen, candidates, promises, mass, limit, far, notify, budget, alone, led
     )
     if two is not None and two.leads:
+        # It was fitted to all there is
+        look.here, look.seen = problem, evaluation
         return Trials(told_of(look, [two.first]))
     if two is not None and here is problem:
         look.fitted = two.instead or two.first
