@@ -63,8 +63,8 @@ def _look(search: Search) -> Look:
     """A look near the noise at which air promises a tenth of what shows, and heavy cables a hundredth."""
     candidates = catalogue(search.problem)
     promises = [
-        Promise(next(c for c in candidates if c.effect == effect), 1e3, {}, share)
-        for effect, share in (("air_drag", 0.1), ("cable_mass", 0.01))
+        Promise(next(c for c in candidates if c.effect == effect), gain, {}, share)
+        for effect, gain, share in (("air_drag", 1e3, 0.1), ("cable_mass", 9e2, 0.01))
     ]
     return Look(
         search.problem,
