@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_mismatch_two_errors import wrong
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.fitted import Fitted
@@ -14,7 +15,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, promises_of, with_reference
 from rig_identification.mismatch.trial import Trial, fitted_to_its_end
-from rig_identification.recording import Recording, Session
+from rig_identification.recording import Session
 from rig_identification.simulate import simulate_session
 
 #: The cell that reads too much, and by how many of its tolerances: within what the ideal model may blame on
@@ -28,20 +29,14 @@ def made() -> Session:
     return simulate_session(replace(shaken(14, 12.0), doubts=False), np.random.default_rng(5))[0]
 
 
-def loud(recording: Recording, newton: float) -> Recording:
-    """The recording as a first cell would have made it that reads ``newton`` too much."""
-    name, tension = next(iter(recording.tension.items()))
-    return replace(
-        recording, tension={**recording.tension, name: replace(tension, values=tension.values + newton)}
-    )
-
-
 def promised_and_kept(session: Session, tolerances: float) -> tuple[Fitted, Promise, Trial]:
     cable = next(iter(session.recordings[0].tension))
     doubts = fit_session(session, lambda stage, share: None, None).problem.bench.parameters.free
     tolerance = next(p.prior_std for p in doubts if p.name == f"{cable}.load_cell_zero")
-    wrong = replace(session, recordings=tuple(loud(r, tolerances * tolerance) for r in session.recordings))
-    fitted = fit_session(wrong, lambda stage, share: None, None)
+    loud = replace(
+        session, recordings=tuple(wrong(r, 0.0, tolerances * tolerance) for r in session.recordings)
+    )
+    fitted = fit_session(loud, lambda stage, share: None, None)
     problem = with_reference(fitted.problem, fitted.rest)
     zeros = [c for c in catalogue(problem) if c.effect == CELL and c.where["channel"] == cable]
     (promise,) = promises_of(problem, fitted.evaluation, zeros)

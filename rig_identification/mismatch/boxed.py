@@ -29,6 +29,12 @@ class Step:
     values: Array  # where it leads these parameters, std of their priors in the problem
 
 
+def probed_of(full: Evaluation, size: int, probed: int) -> NDArray[np.int64]:
+    """Unknowns that are the last ``probed`` starts of every run. size: parameters, which come first."""
+    ends = size + np.cumsum([run.jacobian.shape[1] - size for run in full.runs], dtype=np.int64)
+    return (ends[:, None] - 1 - np.arange(probed)).ravel()
+
+
 class Boxed:
     """A linearised problem, with all that has neither a bound nor a hypothesis eliminated.
 
@@ -45,10 +51,7 @@ class Boxed:
         kept += INERTIAL
         outer = np.ones(full.information.shape[0], dtype=bool)
         outer[kept] = False
-        end = size
-        for run in full.runs:
-            end += run.jacobian.shape[1] - size
-            outer[end - probed : end] = False
+        outer[probed_of(full, size, probed)] = False
         out = np.flatnonzero(outer)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[out], 1e-300))
         inside = full.information[np.ix_(out, out)] * np.outer(scale, scale)

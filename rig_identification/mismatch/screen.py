@@ -19,7 +19,7 @@ from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.beyond import Beyond, Columns
-from rig_identification.mismatch.boxed import Boxed
+from rig_identification.mismatch.boxed import Boxed, probed_of
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.rider_places import Ridden, finer, scanned, spread_of
@@ -174,10 +174,7 @@ def free_without(
         elif q.bounded and abs(point.theta[i]) > wide.bound - 1e-6:
             # Pressed against its bound: it moves only where it is freed
             at_bound[i] = point.theta[i] * full.gradient[i] > 0.0
-    end = wide.bench.parameters.size
-    for run in full.runs:
-        end += run.jacobian.shape[1] - wide.bench.parameters.size
-        at_bound[end - probed : end] = True
+    at_bound[probed_of(full, wide.bench.parameters.size, probed)] = True
     return np.flatnonzero(~at_bound)
 
 
