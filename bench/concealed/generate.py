@@ -24,6 +24,7 @@ from bench.concealed.signals import Trajectory
 from rig_identification.recording import Session
 
 LEAST_TENSION = 0.02  # of the weight: clean scenes stay clear of slack cables by this
+PUSH = 1.0  # N: the engine's rods would go on where a cable goes slack
 MOST_RATE = 0.8  # rad/s
 MOST_STRETCH = 1e-6  # m: faster motion asks more of the engine's rigid cables
 START_ACCURACY = 1e-4  # m/s^2 or rad/s^2, m from the level pose
@@ -73,6 +74,8 @@ def _with_effects(
         for effect in effects:
             scene = effect.alter(scene)
         altered = simulate(scene, effects) if any(e.mechanical for e in effects) else paths
+        if effects and min(path.tension.min() for path in altered) < -PUSH:
+            raise RuntimeError(f"seed {ideal.seed}: with {effects[0].name} a cable would have to push")
         unseen = [e.observe(scene, altered) is None for e in effects]
         if not any(unseen):
             return scene, altered, effects

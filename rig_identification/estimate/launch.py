@@ -18,7 +18,8 @@ from rig_identification.estimate.solve import HOPELESS, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
 from rig_identification.model import layout, sensors
-from rig_identification.model.motion import Input, State, on_cables, simulate
+from rig_identification.model.equilibrium import find_rest, settle
+from rig_identification.model.motion import Input, RigModel, State, on_cables, simulate
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,10 @@ class Launch:
             theta = theta.copy()
             theta[:INERTIAL] = evaluation.point.theta[:INERTIAL]
             rest = rest_of(model_at(problem.bench.parameters, theta))
+            if not _pulls(model_at(problem.bench.parameters, theta), rest):
+                # As described a cable would push: that rig is off by what rest says of it as well
+                theta = evaluation.point.theta
+                rest = settle(model_at(problem.bench.parameters, theta), evaluation.rests[0].rest.state)
         return replace(self, theta=theta, rest=rest, starts=(rest,) * len(problem.runs))
 
     def from_momentum(self) -> Launch:
@@ -81,6 +86,12 @@ class Launch:
         if self.rest is None:
             raise ValueError("from_rest comes first")
         return Point(self.theta, self.starts, (self.rest,) * len(self.problem.rests))
+
+
+def _pulls(model: RigModel, rest: State) -> bool:
+    """Whether the body hangs at ``rest`` with every cable pulling."""
+    found = find_rest(model, rest)
+    return found.converged and bool(np.all(found.tension > 0.0))
 
 
 def tracked(bench: Bench, run: Run, theta: Array, rest: State, doubted: float = 0.0) -> Track | None:
