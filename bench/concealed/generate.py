@@ -75,7 +75,8 @@ def _with_effects(
             scene = effect.alter(scene)
         altered = simulate(scene, effects) if any(e.mechanical for e in effects) else paths
         if effects and min(path.tension.min() for path in altered) < -PUSH:
-            raise RuntimeError(f"seed {ideal.seed}: with {effects[0].name} a cable would have to push")
+            names = " and ".join(e.name for e in effects)
+            raise RuntimeError(f"seed {ideal.seed}: with {names} a cable would have to push")
         unseen = [e.observe(scene, altered) is None for e in effects]
         if not any(unseen):
             return scene, altered, effects
