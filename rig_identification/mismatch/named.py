@@ -14,7 +14,7 @@ from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
-from rig_identification.mismatch.first_fits import at_noise
+from rig_identification.mismatch.first_fits import BEATEN, at_noise
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of
 from rig_identification.mismatch.lawful import lawful_instead
 from rig_identification.mismatch.one_more import one_more
@@ -24,7 +24,7 @@ from rig_identification.mismatch.search import MOST_EFFECTS, trials
 from rig_identification.mismatch.second_choices import most_promising, second_choices
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
 from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
-from rig_identification.mismatch.whole_runs import pruned, whole_runs
+from rig_identification.mismatch.whole_runs import pruned, whole_runs, with_first_instead
 from rig_identification.mismatch.without_first import without_first
 
 Notify = Callable[[str, float], None]
@@ -60,6 +60,7 @@ class _Naming:
     known: Trials | None = None  # ... which is fitted already, and whether its rivals were asked
     lawful: Callable[[], Explained | None] | None = None  # what tells whether a law explains it all instead
     over: bool = False  # nothing more is looked for
+    alike: list[Trial] = field(default_factory=list)  # what hardly trailed the first effect that was found
 
     @property
     def last(self) -> bool:
@@ -152,6 +153,8 @@ class _Naming:
             search.rivals += [rival(t, first.evidence - t.evidence) for t in tried.done]
             self.over = True
             return None
+        if not self.step:
+            self.alike = [t for t in tried.done[1:] if first.evidence - t.evidence < BEATEN]
         search.adopt(tried, first, in_passing=self.known is not None and self.known.asked)
         search.start = max(search.start, tried.left)
         search.share = 1.0 - excess(search.evaluation) / max(search.start, 1.0)
@@ -212,6 +215,9 @@ class _Naming:
         asked = self.law is not None and not self.step and not before.whole
         if best.wholly:
             return self._wholly(before, tried, best, asked=asked)
+        again = self._with_another_first(best)
+        if again is not None:
+            return again
         pushed = self._pushed(before, tried, best)
         if pushed is not None:
             return pushed
@@ -254,6 +260,25 @@ class _Naming:
         if kept is best and not self.last and not self.search.budget.spent():
             return one_more(self.ideal, self.search, kept, self.left, self.notify)
         return kept
+
+    def _with_another_first(self, best: Explained) -> Explained | None:
+        """What explains whole runs with another first effect that hardly trailed it; None where nothing does.
+
+        What the second one leaves tells two apart that with it missing were alike: a clock from a lag.
+        """
+        if len(self.search.found) < MOST_EFFECTS or best.told or not near_noise(best.fitted):
+            return None
+        second = self.search.found[-1].candidate
+        for first in self.alike:
+            plain = first.candidate.build is None and compatible([first.candidate], [second])
+            if not plain or self.search.budget.spent():
+                continue
+            self._say(f"whole runs with {first.candidate.label}, {second.label}")
+            found, its = with_first_instead(self.ideal, self.search, first)
+            if found.wholly:
+                self.search = its
+                return pruned(found, its, len(self.candidates))
+        return None
 
     def _second_choice(self, before: Search, tried: Trials, best: Explained) -> Explained | None:
         """What explains whole runs of less likely hypotheses; None: it goes on, from the likeliest one."""

@@ -17,7 +17,14 @@ from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, beyond_doubt, in_reach, ordinary_errors, strength
+from rig_identification.mismatch.trial import (
+    Trial,
+    beyond_doubt,
+    in_reach,
+    ordinary_errors,
+    promised,
+    strength,
+)
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -28,6 +35,22 @@ def whole_runs(ideal: Ideal, search: Search, *, as_found: bool = False) -> Expla
     """Whole runs with what was found. as_found: it is told in that order, whatever says most."""
     known = search.evaluation.point
     return _fitted_whole(ideal, search, search.found, search.here, known, as_found=as_found)
+
+
+def with_first_instead(ideal: Ideal, search: Search, first: Trial) -> tuple[Explained, Search]:
+    """Whole runs with another ``first`` effect in the place of what was found first, and how it was found."""
+    found = [first, *search.found[1:]]
+    runs = replace(search.problem, runs=search.here.runs)
+    here = extended(runs, tuple(t.candidate for t in found))
+    known = carried(here, search.here, search.evaluation.point)
+    named = first.problem.bench.parameters.named(first.evaluation.point.theta)
+    values = {q.name: named[q.name] for q in first.candidate.parameters}
+    known = promised(here, known, first.candidate, values, search.evaluation)
+    its = search.forked()
+    its.found, its.bodies = found, ()
+    told = first.candidate.where, first.candidate.effect
+    its.rivals = [r for r in its.rivals if (r["where"], r["effect"]) != told]
+    return _fitted_whole(ideal, its, found, here, known), its
 
 
 def _fitted_whole(
