@@ -23,6 +23,7 @@ from rig_identification.mismatch.push import Pushes, push_too
 from rig_identification.mismatch.search import MOST_EFFECTS, trials
 from rig_identification.mismatch.second_choices import most_promising, second_choices
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
+from rig_identification.mismatch.trial import Trial
 from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
 from rig_identification.mismatch.whole_runs import pruned, whole_runs, with_first_instead
 from rig_identification.mismatch.without_first import without_first
@@ -85,9 +86,9 @@ class _Naming:
     def _exchanged(self) -> Explained | None:
         """What explains the session with one more effect, and without one of those before it.
 
-        Of two large errors the one found first may be another's twin, which takes nearly all away and no second
-        one the rest: one of three parallel cables for the next. With the right one beside it nothing of the
-        twin is left. Three that are all needed are one more than is told.
+        Of two large errors the one found first may be another's twin, which takes nearly all away, and no
+        second one the rest: one of three parallel cables for the next. With the right one beside it nothing
+        of the twin is left. Three that are all needed are one more than is told.
         """
         search = self.search
         at_the_end = len(search.found) == MOST_EFFECTS and not (self.over or self.led)
