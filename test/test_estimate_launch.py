@@ -176,3 +176,46 @@ def test_a_guess_with_which_a_cable_would_push_is_mended_by_how_the_body_hangs()
 def test_a_guess_that_hangs_stays_as_it_is() -> None:
     session = tilted_trifilar()
     np.testing.assert_array_equal(elements_that_hang(session), first_elements(session))
+
+
+#: The same rig as it is, and as a lab described it half a millimetre off: ceiling points, hinges, lengths.
+AS_IT_IS = (
+    ([0.17229, -0.06063, 0.00190], [-0.01802, -0.01740, -0.00791], 1.645308),
+    ([3.33918, -0.04304, -0.00370], [1.48375, 0.00292, 0.00741], 1.934013),
+    ([0.17495, 5.04073, 0.01672], [0.00876, 2.49352, 0.01318], 1.962674),
+    ([3.34610, 5.04705, 0.00527], [1.50122, 2.50450, 0.00368], 2.204263),
+)
+AS_DESCRIBED = (
+    ([0.17291, -0.05991, 0.00145], [-0.01845, -0.01765, -0.00760], 1.645716),
+    ([3.33915, -0.04296, -0.00353], [1.48318, 0.00273, 0.00672], 1.932802),
+    ([0.17465, 5.04100, 0.01571], [0.00863, 2.49271, 0.01313], 1.962392),
+    ([3.34600, 5.04687, 0.00351], [1.50085, 2.50418, 0.00416], 2.204353),
+)
+
+
+def _with_cables(rig: Rig, numbers: tuple[tuple[list[float], list[float], float], ...]) -> Rig:
+    cables = tuple(
+        replace(c, ceiling_point=np.array(a), body_point=np.array(b), length=length)
+        for c, (a, b, length) in zip(rig.cables, numbers, strict=True)
+    )
+    return replace(rig, cables=cables)
+
+
+def test_a_rig_described_so_that_a_cable_would_push_is_as_rest_says() -> None:
+    spec = shaken(12)
+    body = np.array([1009.5, 0.602, 0.993, -1.129, 972.5, 1.5, -21.0, 260.2, 32.4, 1007.6])
+    statics = (StaticSpec("bare", 4.0), StaticSpec("loaded", 4.0, Dummy(45.0, np.array([0.95, 0.77, -0.25]))))
+    pull = Pulled(np.array([400.0, 300.0, 0.0]), body[1:4])
+    runs = (RunSpec("run_1", 6.0, pull, UnbalancedMass(1.0, 0.5, ramp=2.0)),)
+    rig = replace(_with_cables(spec.rig, AS_IT_IS), mass=1009.5)
+    hung = replace(spec, rig=rig, elements=body, statics=statics, runs=runs, doubts=False)
+    session, truth = simulate_session(hung, np.random.default_rng(2))
+    assert min(truth.least_tension.values()) > 0.0
+    session = replace(session, rig=_with_cables(session.rig, AS_DESCRIBED))
+    described = rig_model(session.rig, body)
+    assert np.min(find_rest(described, rest_of(described)).tension) < 0.0
+    problem, theta, _ = pose_problem(session)
+    found = Launch(problem, theta).from_rest()
+    assert found.rest is not None
+    assert np.min(find_rest(model_at(problem.bench.parameters, found.theta), found.rest).tension) > 0.0
+    assert misfit(fit_session(session).evaluation) < 1.05

@@ -11,6 +11,7 @@ from rig_identification.estimate.identify import ORDINARY, Ideal, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.along_measured import along_measured
 from rig_identification.mismatch.amounts import CHIEF
+from rig_identification.mismatch.another_first import another_first
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
@@ -25,7 +26,7 @@ from rig_identification.mismatch.second_choices import most_promising, second_ch
 from rig_identification.mismatch.standing import EXPLAINED, WRONG, Search
 from rig_identification.mismatch.trial import Trial
 from rig_identification.mismatch.whole_rivals import likeliest_whole, outdone
-from rig_identification.mismatch.whole_runs import pruned, whole_runs, with_first_instead
+from rig_identification.mismatch.whole_runs import pruned, whole_runs
 from rig_identification.mismatch.without_first import without_first
 
 Notify = Callable[[str, float], None]
@@ -263,23 +264,14 @@ class _Naming:
         return kept
 
     def _with_another_first(self, best: Explained) -> Explained | None:
-        """What explains whole runs with another first effect that hardly trailed it; None where nothing does.
-
-        What the second one leaves tells two apart that with it missing were alike: a clock from a lag.
-        """
+        """What explains whole runs with another first effect that hardly trailed it; None: nothing does."""
         if len(self.search.found) < MOST_EFFECTS or best.told or not near_noise(best.fitted):
             return None
-        second = self.search.found[-1].candidate
-        for first in self.alike:
-            plain = first.candidate.build is None and compatible([first.candidate], [second])
-            if not plain or self.search.budget.spent():
-                continue
-            self._say(f"whole runs with {first.candidate.label}, {second.label}")
-            found, its = with_first_instead(self.ideal, self.search, first)
-            if found.wholly:
-                self.search = its
-                return pruned(found, its, len(self.candidates))
-        return None
+        found = another_first(self.ideal, self.search, self.alike, self._say)
+        if found is None:
+            return None
+        best, self.search = found
+        return pruned(best, self.search, len(self.candidates))
 
     def _second_choice(self, before: Search, tried: Trials, best: Explained) -> Explained | None:
         """What explains whole runs of less likely hypotheses; None: it goes on, from the likeliest one."""

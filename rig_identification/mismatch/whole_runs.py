@@ -17,14 +17,7 @@ from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import (
-    Trial,
-    beyond_doubt,
-    in_reach,
-    ordinary_errors,
-    promised,
-    strength,
-)
+from rig_identification.mismatch.trial import Trial, beyond_doubt, in_reach, ordinary_errors, strength
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -34,26 +27,10 @@ FIRM = 10.0
 def whole_runs(ideal: Ideal, search: Search, *, as_found: bool = False) -> Explained:
     """Whole runs with what was found. as_found: it is told in that order, whatever says most."""
     known = search.evaluation.point
-    return _fitted_whole(ideal, search, search.found, search.here, known, as_found=as_found)
+    return fitted_whole(ideal, search, search.found, search.here, known, as_found=as_found)
 
 
-def with_first_instead(ideal: Ideal, search: Search, first: Trial) -> tuple[Explained, Search]:
-    """Whole runs with another ``first`` effect in the place of what was found first, and how it was found."""
-    found = [first, *search.found[1:]]
-    runs = replace(search.problem, runs=search.here.runs)
-    here = extended(runs, tuple(t.candidate for t in found))
-    known = carried(here, search.here, search.evaluation.point)
-    named = first.problem.bench.parameters.named(first.evaluation.point.theta)
-    values = {q.name: named[q.name] for q in first.candidate.parameters}
-    known = promised(here, known, first.candidate, values, search.evaluation)
-    its = search.forked()
-    its.found, its.bodies = found, ()
-    told = first.candidate.where, first.candidate.effect
-    its.rivals = [r for r in its.rivals if (r["where"], r["effect"]) != told]
-    return _fitted_whole(ideal, its, found, here, known), its
-
-
-def _fitted_whole(
+def fitted_whole(
     ideal: Ideal,
     search: Search,
     found: list[Trial],
@@ -147,7 +124,7 @@ def pruned(best: Explained, search: Search, count: int) -> Explained:
             if strengths[i] > FIRM:
                 return best
             less = [t for k, t in enumerate(kept) if k != i]
-            again = _fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
+            again = fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
             if again.told and (best.trace or not again.trace):
                 # What leaves a trace that both together do not leave lacks something
                 best, kept = again, less
