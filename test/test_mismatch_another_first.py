@@ -1,13 +1,20 @@
-"""A near twin of what was found first is asked beside what was found second."""
+"""What was found first gives way to its twin, once what was found second is known."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+from test_estimate_launch import tilted_trifilar
 from test_mismatch_whole_rivals import fit_of, ideal_of, search_in
 from test_simulate_identify import shaken
 
+from rig_identification.estimate.identify import Ideal, fit_session, judged
 from rig_identification.mismatch.another_first import another_first
 from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.named import _Naming
 from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import promises_of
 from rig_identification.mismatch.standing import Search
@@ -53,3 +60,45 @@ def test_a_clock_takes_the_place_of_its_lag_once_the_inclinometers_zero_is_known
     assert all(a["effect"] != "clock_offset" for a in best.mismatch.alternatives)
     # What does not explain them all either leaves it as it was
     assert another_first(ideal, wrong, [lag], said.append) is None
+
+
+#: Of three parallel cables the one whose upper hinge is described 5 mm too high, and so much more (m), and
+#: another one.
+HIGHER = 0.015
+TWIN = "hinge_position cable_1 ceiling z"
+ASIDE = "inclinometer_offset inclinometer x"
+
+
+def _naming(ideal: Ideal, search: Search) -> _Naming:
+    return _Naming(
+        ideal, search, lambda label, fraction: None, None, None, catalogue(search.problem), search_in(ideal)
+    )
+
+
+def test_one_more_effect_makes_a_twin_needless() -> None:
+    session = tilted_trifilar()
+    assert session.rig.inclinometer is not None
+    turned = replace(session.rig.inclinometer, orientation=Rotation.from_rotvec([0.0, -ZERO, 0.0]).as_quat())
+    *others, last = session.rig.cables
+    last = replace(last, ceiling_point=last.ceiling_point + np.array([0.0, 0.0, HIGHER]))
+    rig = replace(session.rig, inclinometer=turned, cables=(*others, last))
+    fitted = fit_session(replace(session, rig=rig))
+    ideal = Ideal(fitted, *judged(fitted))
+    origin = search_in(ideal)
+    twin = fit_of(origin, TWIN)
+    wrong = origin.forked()
+    wrong.adopt(Trials([twin]), twin)
+    wrong = with_second(wrong, ASIDE)
+    assert not whole_runs(ideal, wrong).wholly
+    found = _naming(ideal, wrong)._exchanged()
+    assert found is not None
+    assert found.wholly
+    told = {f.effect: f for f in found.mismatch.findings}
+    assert len(told) == 2
+    # Three hinges at the ceiling, one of them off, are a level that is off as well
+    assert all(f.where["channel"] != "cable_1" for f in told.values())
+    assert abs(told["inclinometer_offset"].parameters["offset"]["value"]) == pytest.approx(ZERO, abs=1e-3)
+    # Where nothing else is in the model there is nothing to exchange
+    alone = origin.forked()
+    alone.adopt(Trials([twin]), twin)
+    assert _naming(ideal, alone)._exchanged() is None

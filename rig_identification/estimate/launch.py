@@ -14,12 +14,12 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, drive, model_at
 from rig_identification.estimate.rest_evidence import coarsened
 from rig_identification.estimate.side_by_side import side_by_side
-from rig_identification.estimate.solve import HOPELESS, Point, Problem, solve
+from rig_identification.estimate.solve import HOPELESS, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
 from rig_identification.model import layout, sensors
-from rig_identification.model.equilibrium import find_rest, settle
-from rig_identification.model.motion import Input, RigModel, State, on_cables, simulate
+from rig_identification.model.equilibrium import settle
+from rig_identification.model.motion import Input, State, on_cables, simulate
 
 Array = NDArray[np.float64]
 
@@ -52,8 +52,8 @@ class Launch:
             theta = theta.copy()
             theta[:INERTIAL] = evaluation.point.theta[:INERTIAL]
             rest = rest_of(model_at(problem.bench.parameters, theta))
-            if not _pulls(model_at(problem.bench.parameters, theta), rest):
-                # As described a cable would push: that rig is off by what rest says of it as well
+            if _hopeless(roughly, theta, rest) and _square(evaluation) < HOPELESS:
+                # Cables almost without play: half a millimetre moves such a rest by centimetres
                 theta = evaluation.point.theta
                 rest = settle(model_at(problem.bench.parameters, theta), evaluation.rests[0].rest.state)
         return replace(self, theta=theta, rest=rest, starts=(rest,) * len(problem.runs))
@@ -88,10 +88,16 @@ class Launch:
         return Point(self.theta, self.starts, (self.rest,) * len(self.problem.rests))
 
 
-def _pulls(model: RigModel, rest: State) -> bool:
-    """Whether the body hangs at ``rest`` with every cable pulling."""
-    found = find_rest(model, rest)
-    return found.converged and bool(np.all(found.tension > 0.0))
+def _hopeless(rests: Problem, theta: Array, rest: State) -> bool:
+    """Whether the static recordings are nowhere near a body that hangs at ``rest``."""
+    there = evaluate(rests, Point(theta, (), (rest,) * len(rests.rests)), residuals_only=True)
+    return there is None or _square(there) > HOPELESS
+
+
+def _square(evaluation: Evaluation) -> float:
+    """Mean square of what the static recordings leave."""
+    residuals = np.concatenate([np.zeros(0), *(rest.residual for rest in evaluation.rests)])
+    return float(np.mean(residuals**2)) if residuals.size else 0.0
 
 
 def tracked(bench: Bench, run: Run, theta: Array, rest: State, doubted: float = 0.0) -> Track | None:

@@ -48,7 +48,5 @@ def _instead(ideal: Ideal, search: Search, first: Trial) -> tuple[Explained, Sea
     runs = replace(search.problem, runs=search.here.runs)
     here = extended(runs, tuple(t.candidate for t in its.found))
     point = carried(here, search.here, search.evaluation.point)
-    named = first.problem.bench.parameters.named(first.evaluation.point.theta)
-    values = {q.name: named[q.name] for q in first.candidate.parameters}
-    point = promised(here, point, first.candidate, values, search.evaluation)
+    point = promised(here, point, first.candidate, first.values, search.evaluation)
     return fitted_whole(ideal, its, its.found, here, point), its

@@ -29,6 +29,7 @@ class Explained:
     loose: float = 1.0  # factor on every variance where a trace is left
     trace: bool = False  # whether something is left at all, be it next to nothing
     bodies: Bodies = ()  # what rivals make of the body
+    possible: bool = True  # whether every effect in it has an amount and a place that it can have
 
     @property
     def told(self) -> bool:

@@ -26,8 +26,7 @@ def lag_like(clock: Trial, candidates: Sequence[Candidate]) -> Promise | None:
     """The lag of the device whose clock a trial finds late; None where it finds none late."""
     if clock.candidate.effect != "clock_offset":
         return None
-    values = clock.problem.bench.parameters.named(clock.evaluation.point.theta)
-    late = float(values[clock.candidate.parameters[0].name])
+    late = clock.values[clock.candidate.parameters[0].name]
     channel = clock.candidate.where.get("channel")
     for lag in candidates:
         if late > 0.0 and lag.effect == "sensor_lag" and lag.where.get("channel") == channel:

@@ -38,7 +38,10 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         best = whole_runs(ideal, search)
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
-    told = best if convincing and best is not None and misfit(best.fitted.evaluation) < WRONG else None
+    # A part of less than no mass on springs takes away what a push to a beat does
+    possible = best is None or best.possible
+    near = best is not None and possible and misfit(best.fitted.evaluation) < WRONG
+    told = best if convincing and near else None
     nearly_all = told is not None and _next_to_none(ideal, told, search.found)
     heard = None if told is None else hear(told.fitted)
     if told is not None and heard is not None and (nearly_all or not heard.contradicted):
@@ -104,7 +107,7 @@ def _bases(ideal: Ideal, search: Search, best: Explained | None, *, alone: bool)
         yield (), ideal.fitted
     if best is None and search.found and not search.budget.late():
         best = whole_runs(ideal, search)
-    if best is not None:
+    if best is not None and best.possible:
         yield best.mismatch.findings, best.fitted
 
 

@@ -206,9 +206,7 @@ class Look:
     def _promised_by(self, led: Trial) -> Promise:
         """What led here is as good as kept: first order may say little of it, as it did before."""
         most = max((p.gain for p in self.promises), default=0.0)
-        named = led.problem.bench.parameters.named(led.evaluation.point.theta)
-        values = {q.name: named[q.name] for q in led.candidate.parameters}
-        return Promise(led.candidate, most, values, share=1.0)
+        return Promise(led.candidate, most, led.values, share=1.0)
 
     def as_measured(self) -> None:
         """What the motion that was measured promises most of, in a rig as it is described.

@@ -69,6 +69,12 @@ class Trial:
     evidence: float  # log marginal likelihood less a constant
     settled: bool = False  # fitted to its end
 
+    @property
+    def values(self) -> dict[str, float]:
+        """What the fit makes of the hypothesis' parameters, in their own units, by name."""
+        named = self.problem.bench.parameters.named(self.evaluation.point.theta)
+        return {q.name: named[q.name] for q in self.candidate.parameters}
+
 
 def mass_of(problem: Problem, evaluation: Evaluation) -> float:
     """Mass of the body as fitted, kg."""
@@ -354,7 +360,7 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
             stop=stop,
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
-    if not _sensible(trial):
+    if not sensible(trial):
         return None
     if stop():
         return trial
@@ -372,7 +378,7 @@ def fitted_to_its_end(
 
 def as_it_stands(trial: Trial) -> Trial | None:
     """The trial where its first steps led; None where its sign makes no sense."""
-    return trial if _sensible(trial) else None
+    return trial if sensible(trial) else None
 
 
 def _closest(trial: Trial, stop: Stop) -> Trial:
@@ -383,11 +389,14 @@ def _closest(trial: Trial, stop: Stop) -> Trial:
         _described(trial, candidate, values, stop)
         for candidate, values in trial.candidate.closer(trial.problem, trial.evaluation)
     )
-    return max((trial, *(t for t in closer if t is not None and _sensible(t))), key=lambda t: t.evidence)
+    return max((trial, *(t for t in closer if t is not None and sensible(t))), key=lambda t: t.evidence)
 
 
-def _sensible(trial: Trial) -> bool:
-    """Whether what cannot be negative is not, and what is at a place of the body can be there."""
+def sensible(trial: Trial) -> bool:
+    """Whether what cannot be negative is not, and what is at a place of the body can be there.
+
+    As a trial ends, and in whole runs again, which may lead it elsewhere.
+    """
     right = all(z >= (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial))
     return right and in_reach(trial)
 

@@ -17,7 +17,7 @@ from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, beyond_doubt, in_reach, ordinary_errors, strength
+from rig_identification.mismatch.trial import Trial, beyond_doubt, ordinary_errors, sensible, strength
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -61,9 +61,13 @@ def fitted_whole(
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = effects_of(findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
-    if not all(in_reach(as_fitted(fitted, t)) for t in found):
+    possible = all(sensible(as_fitted(fitted, t)) for t in found)
+    if not possible:
         told, trace = "unexplained", False
-        text = f"{named} would act where no body in this rig can be: it stands for something else. {errors}"
+        text = (
+            f"{named} would have less than nothing of an amount, or act where no body in this rig can be: it "
+            f"stands for something else. {errors}"
+        )
     elif verdict.verdict == "none":
         told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
     elif trace:
@@ -71,9 +75,8 @@ def fitted_whole(
     else:
         told = "unexplained"
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
-    return Explained(
-        fitted, Mismatch(told, text, findings, tuple(search.rivals)), ideal, loose, trace, search.bodies
-    )
+    mismatch = Mismatch(told, text, findings, tuple(search.rivals))
+    return Explained(fitted, mismatch, ideal, loose, trace, search.bodies, possible)
 
 
 def strayed(fitted: Fitted) -> bool:
