@@ -59,6 +59,20 @@ def test_names_that_leave_next_to_nothing_are_told_from_those_that_stand_in(
     assert not _next_to_none(ideal, whole, [damping, replace(damping, candidate=bends)])
 
 
+def test_what_cannot_be_is_not_told_though_it_takes_nearly_all_away(damped: tuple[Ideal, Search]) -> None:
+    ideal, search = damped
+    damping = fit_of(search, "hinge_damping")
+    found = search.forked()
+    found.adopt(Trials([damping]), damping)
+    found.share = 1.0
+    best = whole_runs(ideal, found)
+    assert best.possible
+    told = unexplained(ideal, found, best, lambda label, fraction: None)
+    assert told.mismatch.findings[0].effect == "hinge_damping"
+    less = unexplained(ideal, found, replace(best, possible=False), lambda label, fraction: None)
+    assert all(f.effect != "hinge_damping" for f in less.mismatch.findings)
+
+
 def _look(search: Search) -> Look:
     """A look near the noise at which air promises a tenth of what shows, and heavy cables a hundredth."""
     candidates = catalogue(search.problem)

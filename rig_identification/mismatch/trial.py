@@ -360,7 +360,7 @@ def finished(trial: Trial, budget: Budget = UNLIMITED) -> Trial | None:
             stop=stop,
         )
         trial = replace(trial, evaluation=fitted, evidence=log_evidence(fitted), settled=True)
-    if not sensible(trial):
+    if not _sensible(trial):
         return None
     if stop():
         return trial
@@ -378,7 +378,7 @@ def fitted_to_its_end(
 
 def as_it_stands(trial: Trial) -> Trial | None:
     """The trial where its first steps led; None where its sign makes no sense."""
-    return trial if sensible(trial) else None
+    return trial if _sensible(trial) else None
 
 
 def _closest(trial: Trial, stop: Stop) -> Trial:
@@ -389,16 +389,21 @@ def _closest(trial: Trial, stop: Stop) -> Trial:
         _described(trial, candidate, values, stop)
         for candidate, values in trial.candidate.closer(trial.problem, trial.evaluation)
     )
-    return max((trial, *(t for t in closer if t is not None and sensible(t))), key=lambda t: t.evidence)
+    return max((trial, *(t for t in closer if t is not None and _sensible(t))), key=lambda t: t.evidence)
 
 
-def sensible(trial: Trial) -> bool:
-    """Whether what cannot be negative is not, and what is at a place of the body can be there.
+def _sensible(trial: Trial) -> bool:
+    """Whether what cannot be negative is not, as a trial ends, and what is at a place can be there."""
+    return possible(trial) and (trial.candidate.positive != 1 or all(z >= 0.0 for z in signs(trial)))
 
-    As a trial ends, and in whole runs again, which may lead it elsewhere.
+
+def possible(trial: Trial) -> bool:
+    """Whether nothing that cannot be negative clearly is, and what is at a place of the body can be there.
+
+    In whole runs, which may lead a trial elsewhere than where it ended, an amount that may as well be none is
+    dropped (pruned) and no reason to doubt what is beside it.
     """
-    right = all(z >= (0.0 if trial.candidate.positive == 1 else -ABSURD) for z in signs(trial))
-    return right and in_reach(trial)
+    return all(z >= -ABSURD for z in signs(trial)) and in_reach(trial)
 
 
 def in_reach(trial: Trial) -> bool:

@@ -17,7 +17,7 @@ from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, beyond_doubt, ordinary_errors, sensible, strength
+from rig_identification.mismatch.trial import Trial, beyond_doubt, ordinary_errors, possible, strength
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -61,8 +61,8 @@ def fitted_whole(
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     named = effects_of(findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
-    possible = all(sensible(as_fitted(fitted, t)) for t in found)
-    if not possible:
+    can_be = all(possible(as_fitted(fitted, t)) for t in found)
+    if not can_be:
         told, trace = "unexplained", False
         text = (
             f"{named} would have less than nothing of an amount, or act where no body in this rig can be: it "
@@ -76,7 +76,7 @@ def fitted_whole(
         told = "unexplained"
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
     mismatch = Mismatch(told, text, findings, tuple(search.rivals))
-    return Explained(fitted, mismatch, ideal, loose, trace, search.bodies, possible)
+    return Explained(fitted, mismatch, ideal, loose, trace, search.bodies, can_be)
 
 
 def strayed(fitted: Fitted) -> bool:
