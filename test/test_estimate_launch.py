@@ -146,18 +146,22 @@ SPLAYED = (
 )
 
 
-def test_a_guess_with_which_a_cable_would_push_is_mended_by_how_the_body_hangs() -> None:
-    spec = shaken(12)
+def _with_cables(rig: Rig, numbers: tuple[tuple[list[float], list[float], float], ...]) -> Rig:
     cables = tuple(
         replace(c, ceiling_point=np.array(a), body_point=np.array(b), length=length)
-        for c, (a, b, length) in zip(spec.rig.cables, SPLAYED, strict=True)
+        for c, (a, b, length) in zip(rig.cables, numbers, strict=True)
     )
+    return replace(rig, cables=cables)
+
+
+def test_a_guess_with_which_a_cable_would_push_is_mended_by_how_the_body_hangs() -> None:
+    spec = shaken(12)
     body = np.array([989.0, 0.685, 1.030, -1.183, 876.0, -1.8, 3.7, 245.0, 11.1, 1033.0])
     dummy = Dummy(45.0, np.array([0.95, 0.77, -0.25]))
     statics = (StaticSpec("bare", 4.0), StaticSpec("loaded", 4.0, dummy))
     pull = Pulled(np.array([80.0, 60.0, 0.0]), body[1:4])
     runs = (RunSpec("run_1", 6.0, pull, UnbalancedMass(1.0, 1.61, ramp=2.0)),)
-    rig = replace(spec.rig, cables=cables, mass=989.0)
+    rig = replace(_with_cables(spec.rig, SPLAYED), mass=989.0)
     hung = replace(spec, rig=rig, elements=body, statics=statics, runs=runs)
     session, truth = simulate_session(hung, np.random.default_rng(2))
     assert min(truth.least_tension.values()) > 0.0
@@ -191,14 +195,6 @@ AS_DESCRIBED = (
     ([0.17465, 5.04100, 0.01571], [0.00863, 2.49271, 0.01313], 1.962392),
     ([3.34600, 5.04687, 0.00351], [1.50085, 2.50418, 0.00416], 2.204353),
 )
-
-
-def _with_cables(rig: Rig, numbers: tuple[tuple[list[float], list[float], float], ...]) -> Rig:
-    cables = tuple(
-        replace(c, ceiling_point=np.array(a), body_point=np.array(b), length=length)
-        for c, (a, b, length) in zip(rig.cables, numbers, strict=True)
-    )
-    return replace(rig, cables=cables)
 
 
 def test_a_rig_described_so_that_a_cable_would_push_is_as_rest_says() -> None:

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from test_estimate_launch import tilted_trifilar
 from test_mismatch_whole_rivals import fit_of, ideal_of, search_in
+from test_mismatch_without_first import fit_beside
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import Ideal, fit_session, judged
@@ -16,9 +17,7 @@ from rig_identification.mismatch.another_first import another_first
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.named import _Naming
 from rig_identification.mismatch.outcome import Trials
-from rig_identification.mismatch.screen import promises_of
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import attempt, finished
 from rig_identification.mismatch.whole_runs import whole_runs
 
 #: s by which the IMU's stamps are late, rad that an inclinometer reads too much.
@@ -28,12 +27,7 @@ CLOCK, LAG, SECOND = "clock_offset imu", "sensor_lag imu", "inclinometer_offset 
 
 def with_second(search: Search, label: str) -> Search:
     """The search with a hypothesis in its model beside what was found."""
-    after = search.forked()
-    candidate = next(c for c in catalogue(search.problem) if c.label == label)
-    (promise,) = promises_of(after.here, after.evaluation, [candidate])
-    begun = attempt(after.here, after.evaluation, promise)
-    ended = None if begun is None else finished(begun)
-    assert ended is not None
+    after, ended = search.forked(), fit_beside(search, label)
     after.adopt(Trials([ended]), ended)
     return after
 

@@ -114,28 +114,25 @@ def test_an_effect_of_few_places_is_fitted_beside_one_of_many() -> None:
     assert as_likely(promises, [], 3.0) == []
 
 
+def _with_number(label: str, name: str, value: float) -> Trial:
+    """A hypothesis in the true body's model, one of its numbers at ``value`` (std of its prior), unfitted."""
+    problem, found = seen_by_the_true_body(replace(shaken(14, 4.0), doubts=False), 3)
+    candidate = next(c for c in catalogue(problem) if c.label == label)
+    wide = extended(problem, (candidate,))
+    point = carried(wide, problem, found.point)
+    theta = point.theta.copy()
+    theta[wide.bench.parameters.index_of(name)] = value
+    there = evaluate(wide, replace(point, theta=theta))
+    assert there is not None
+    return Trial(candidate, wide, there, 0.0)
+
+
 @pytest.mark.parametrize(("away", "there_can_be"), [(0.5, True), (3.9, True), (6.0, False)])
 def test_a_hose_is_tied_to_what_a_body_in_this_rig_may_fill(away: float, there_can_be: bool) -> None:
     """away: of its point from the body's middle, in lengths of the rig; known to one of them, no better."""
-    problem, found = seen_by_the_true_body(replace(shaken(14, 4.0), doubts=False), 3)
-    hose = next(c for c in catalogue(problem) if c.label == "tether x")
-    wide = extended(problem, (hose,))
-    point = carried(wide, problem, found.point)
-    theta = point.theta.copy()
-    theta[wide.bench.parameters.index_of("tether.point.y")] = away
-    there = evaluate(wide, replace(point, theta=theta))
-    assert there is not None
-    assert in_reach(Trial(hose, wide, there, 0.0)) is there_can_be
+    assert in_reach(_with_number("tether x", "tether.point.y", away)) is there_can_be
 
 
 @pytest.mark.parametrize(("amount", "can_be"), [(1.0, True), (0.0, True), (-1.0, False)])
 def test_hinges_that_push_a_swing_on_are_not_possible(amount: float, can_be: bool) -> None:
-    problem, found = seen_by_the_true_body(replace(shaken(14, 4.0), doubts=False), 3)
-    damping = next(c for c in catalogue(problem) if c.label == "hinge_damping")
-    wide = extended(problem, (damping,))
-    point = carried(wide, problem, found.point)
-    theta = point.theta.copy()
-    theta[wide.bench.parameters.index_of(damping.parameters[0].name)] = amount
-    there = evaluate(wide, replace(point, theta=theta))
-    assert there is not None
-    assert possible(Trial(damping, wide, there, 0.0)) is can_be
+    assert possible(_with_number("hinge_damping", "hinge.damping", amount)) is can_be

@@ -10,7 +10,7 @@ from rig_identification.mismatch.hypotheses import catalogue, count_of
 from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import promises_of
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, attempt, finished
+from rig_identification.mismatch.trial import Trial, fitted_to_its_end
 from rig_identification.mismatch.without_first import without_first
 
 #: What is found first, and what is found beside it.
@@ -20,17 +20,21 @@ GAIN = f"{CABLE}.load_cell_gain"
 DAMPING, TOO_MUCH = 1.0, 0.02
 
 
+def fit_beside(search: Search, label: str) -> Trial:
+    """A hypothesis fitted beside what was found."""
+    candidate = next(c for c in catalogue(search.problem) if c.label == label)
+    (promise,) = promises_of(search.here, search.evaluation, [candidate])
+    ended = fitted_to_its_end(search.here, search.evaluation, promise)
+    assert ended is not None
+    return ended
+
+
 def _beside(search: Search, label: str) -> tuple[Search, Trial]:
     """A search with the first in its model, and a fit of a hypothesis beside it."""
     first = fit_of(search, FIRST)
     after = search.forked()
     after.adopt(Trials([first]), first)
-    candidate = next(c for c in catalogue(search.problem) if c.label == label)
-    (promise,) = promises_of(after.here, after.evaluation, [candidate])
-    begun = attempt(after.here, after.evaluation, promise)
-    ended = None if begun is None else finished(begun)
-    assert ended is not None
-    return after, ended
+    return after, fit_beside(after, label)
 
 
 def _gain(trial: Trial) -> tuple[float, float]:

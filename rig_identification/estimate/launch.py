@@ -52,7 +52,7 @@ class Launch:
             theta = theta.copy()
             theta[:INERTIAL] = evaluation.point.theta[:INERTIAL]
             rest = rest_of(model_at(problem.bench.parameters, theta))
-            if _hopeless(roughly, theta, rest) and _square(evaluation) < HOPELESS:
+            if _square(evaluation) < HOPELESS and _hopeless(roughly, theta, rest):
                 # Cables almost without play: half a millimetre moves such a rest by centimetres
                 theta = evaluation.point.theta
                 rest = settle(model_at(problem.bench.parameters, theta), evaluation.rests[0].rest.state)

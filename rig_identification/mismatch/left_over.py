@@ -39,8 +39,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
     notify("search: the missing wrench", 0.95)
     here, evaluation = search.here, search.evaluation
     # A part of less than no mass on springs takes away what a push to a beat does
-    possible = best is None or best.possible
-    near = best is not None and possible and misfit(best.fitted.evaluation) < WRONG
+    near = best is not None and best.possible and misfit(best.fitted.evaluation) < WRONG
     told = best if convincing and near else None
     nearly_all = told is not None and _next_to_none(ideal, told, search.found)
     heard = None if told is None else hear(told.fitted)
