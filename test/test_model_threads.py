@@ -28,11 +28,12 @@ Array = NDArray[np.float64]
 AXIS = np.array([1.0, 0.0, 0.0])
 
 
-def having(model: RigModel, **amounts: float) -> RigModel:
-    """The model with amounts of effects by their names in place.py."""
+def having(model: RigModel, **amounts: float | np.ndarray) -> RigModel:
+    """The model with amounts of effects, or several at once, by their names in place.py."""
     physics = model.physics.copy()
     for name, value in amounts.items():
-        physics[place.effects_block(model.cables) + getattr(place, name)] = value
+        first = place.effects_block(model.cables) + getattr(place, name)
+        physics[first : first + np.size(value)] = value
     return model.with_physics(physics)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 from test_model_conservation import kinetic_and_potential
 from test_model_derivatives import SUBSTEPS, assert_close, check_physics, drive_of, physics_derivative
@@ -22,19 +23,21 @@ from rig_identification.model.effects.cable_torsion import add_cable_torsion
 from rig_identification.model.motion import Input, simulate
 
 STIFFNESS, STIFF = 2e3, 100.0  # N m/rad: of the motion, and as a search meets it
+TWISTS = np.array([150.0, -220.0, 90.0])  # N m, world: of cables that were clamped otherwise than they hang
 
 
 def test_a_swing_on_cables_that_twist_keeps_its_energy() -> None:
     sample = thesis_case_14()
     plain = sample.model(rods=True)
     turned = Rotation.from_rotvec([0.1, -0.05, 0.4]).as_matrix() @ sample.start.R_world_body
-    model = having(plain.referred(replace(sample.start, R_world_body=turned)), TORSION=STIFFNESS)
+    model = having(plain.referred(replace(sample.start, R_world_body=turned)), TORSION=STIFFNESS, TWISTED=TWISTS)
     motion = simulate(model, sample.start, Input.none(501, 0.01), substeps=8)
     stored = []
     for x, R in zip(motion.states, motion.R_world_body, strict=True):
         A = R @ turned.T
         w = 0.5 * np.array([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
-        stored.append(0.5 * STIFFNESS * np.sum((cables_in_body(model, x[:3], R) @ R.T @ w) ** 2))
+        along = cables_in_body(model, x[:3], R) @ R.T
+        stored.append(np.sum(0.5 * STIFFNESS * (along @ w) ** 2 + (along @ w) * (along @ TWISTS)))
     kinetic, potential = kinetic_and_potential(model, motion)
     assert np.ptp(stored) > 0.01 * np.ptp(kinetic)
     assert np.ptp(kinetic + potential + np.array(stored)) < 1e-6 * np.ptp(kinetic)
@@ -60,7 +63,7 @@ def test_cables_that_hang_straight_take_all_of_a_turn_about_the_vertical() -> No
 
 def test_derivatives() -> None:
     sample = random_sample(5, 3)
-    model = having(sample.model(rods=True).referred(sample.start), TORSION=STIFFNESS)
+    model = having(sample.model(rods=True).referred(sample.start), TORSION=STIFFNESS, TWISTED=TWISTS)
     state, drive = moving(sample, model, 5), drive_of(61, 0.01, 5)
     o = layout.cable_offset(1)
     check_physics(model, state, drive, [o + layout.BODY_POINT + 1, o + layout.CEILING_POINT], 1e-6)
@@ -68,10 +71,19 @@ def test_derivatives() -> None:
     exact = simulate(model, state, drive, directions=np.array([entry]), substeps=SUBSTEPS)
     assert exact.J is not None
     assert_close(exact.J[:, :, 0], physics_derivative(model, state, drive, entry, 1.0), "TORSION", 1e-6)
+    alone = having(model, TORSION=0.0, TWISTED=np.zeros(3))
+    entries = np.arange(entry, entry + 4)
+    none = simulate(alone, state, drive, directions=entries, substeps=SUBSTEPS)
+    assert none.J is not None
+    for k, twisted in enumerate(entries):
+        exact_of_one = physics_derivative(alone, state, drive, twisted, 1.0)
+        assert_close(none.J[:, :, k], exact_of_one, f"TORSION + {k}", 1e-6)
 
 
-def test_cables_that_twist_are_found_as_stiff_as_they_are() -> None:
-    spec = replace(shaken(14, 12.0), effects={"cable_torsion": (STIFF,)}, doubts=False)
+@pytest.mark.parametrize("twist", [(0.0, 0.0, 0.0), (1.0, -6.0, 3.0)])
+def test_cables_that_twist_are_found_as_stiff_and_as_twisted_as_they_are(twist: tuple[float, ...]) -> None:
+    effects = {"cable_torsion": (STIFF,), "cable_torsion.twist": twist}
+    spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
     problem, found = seen_by_the_true_body(spec, 3)
     promises = screen(problem, found, catalogue(problem), mass_of(problem, found))
     torsion = next(p for p in promises if p.candidate.where.get("law") == "torsion of the cables")
@@ -79,6 +91,9 @@ def test_cables_that_twist_are_found_as_stiff_as_they_are() -> None:
     ended = None if begun is None else finished(begun)
     assert ended is not None
     assert found.cost - ended.evaluation.cost > 1.0
-    told = {q.name: q for q in parameter_estimates(ended.problem, ended.evaluation)}["cable.torsion"]
-    assert abs(told.value - STIFF) < 3.0 * told.std < STIFF
-    assert list(ended.candidate.told({told.name: told.value}, {told.name: told.std})) == ["torsion_stiffness"]
+    found_at = {q.name: q for q in parameter_estimates(ended.problem, ended.evaluation)}
+    names = [q.name for q in ended.candidate.parameters]
+    told = ended.candidate.told(*({n: getattr(found_at[n], k) for n in names} for k in ("value", "std")))
+    assert list(told) == ["torsion_stiffness", "twist_x", "twist_y", "twist_z"]
+    for (value, std, _), true in zip(told.values(), (STIFF, *twist), strict=True):
+        assert abs(value - true) < 3.0 * std < STIFF

@@ -81,6 +81,7 @@ class PlantEffects:
     exciter_rotor: float = 0.0  # kg
     cable_mass: float = 0.0  # kg/m
     cable_torsion: float = 0.0  # N m/rad, each cable
+    cable_twist: Array = field(default_factory=lambda: np.zeros(3))  # N m, world: of each cable at rest
     axial_stiffness: float = 0.0  # N, EA of the cables; 0: inextensible
     axial_damping_ratio: float = 0.0  # of the body's bounce on its cables
     tether: Array = field(default_factory=lambda: np.zeros(3))  # N/m, world axes
@@ -105,7 +106,7 @@ class PlantEffects:
 def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     """The same rig with ``effects``.
 
-    A tether pulls as told, and a rider's spring bears its weight, where the rig hangs at rest without these.
+    A tether pulls as told, cables are twisted as told, and a rider's spring bears its weight, where the rig hangs at rest without these.
     """
     elastic = _elastic(model, effects)
     physics = _with_rig_errors(elastic, effects)
@@ -122,6 +123,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.TORSION] = effects.cable_torsion
     rest = _rest(elastic.with_physics(physics))
     physics = elastic.with_physics(physics).referred(rest).physics
+    physics[block + place.TWISTED : block + place.TWISTED + 3] = effects.cable_twist
     physics[block + place.TETHER_STIFFNESS : block + place.TETHER_STIFFNESS + 3] = effects.tether
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = effects.tether_point
     physics[block + place.TETHER_PULL : block + place.TETHER_PULL + 3] = effects.tether_pull

@@ -29,6 +29,8 @@ CREEP_SPREAD = 1.1
 #: m: a cable's torsional stiffness, as a share of the weight that it helps to carry. A steel rope of a
 #: centimetre, two metres long, has some 5 N m/rad, a rod of that size 40: parts in a thousand of 10 kN.
 TWISTED = 0.005
+#: rad between how the body hangs and how it was held when the cables were clamped: it may lean by so much.
+CLAMPED = 0.1
 #: kg/m: what hangs a body is what is at hand, and strong enough many times over, however light the body is. A
 #: wire rope of 16 mm weighs 1 kg/m, a chain of 13 mm 3.8 kg/m.
 HEAVY_CABLE = 1.0
@@ -53,6 +55,13 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             "creep_rate": (values["hinge.creep"], stds["hinge.creep"], "rad/s"),
         }
 
+    def twisted(values: dict[str, float], stds: dict[str, float]) -> Told:
+        told = {"torsion_stiffness": (values["cable.torsion"], stds["cable.torsion"], "N*m/rad")}
+        for axis in "xyz":
+            told[f"twist_{axis}"] = (values[f"cable.twisted_{axis}"], stds[f"cable.twisted_{axis}"], "N*m")
+        return told
+
+    stiff = TWISTED * mass * rig.gravity
     out = [
         Candidate(
             "hinge_damping",
@@ -103,12 +112,18 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         _cable_mass(rig, block),
         Candidate(
             "unknown",
-            (added("cable.torsion", "N*m/rad", TWISTED * mass * rig.gravity, block + place.TORSION),),
+            (
+                added("cable.torsion", "N*m/rad", stiff, block + place.TORSION),
+                *(
+                    added(f"cable.twisted_{axis}", "N*m", CLAMPED * stiff, block + place.TWISTED + i)
+                    for i, axis in enumerate("xyz")
+                ),
+            ),
             "The cables resist being twisted: each turns the body back by {value} about itself.",
             "Hang the cables on swivels; what twists them looks like less inertia at any one frequency.",
             {"channel": None, "axis": None, "law": "torsion of the cables"},
             positive=1,
-            name_in_result="torsion_stiffness",
+            tell=twisted,
             everywhere=True,
         ),
         *tethers(rig, mass),

@@ -68,7 +68,7 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
     hinges = hinges or active(physics[block + BENDING]) or active(physics[block + ROLL_STIFFNESS])
-    hinges = hinges or active(physics[block + TORSION])
+    hinges = hinges or _any_active(physics, block + TORSION, 4)
     return body, rotor or rods or _riders(physics, modes, internal), rotor, rods or hinges
 
 
@@ -145,7 +145,7 @@ def _add_at_cables(physics, block, modes, cables, x, R, K, r):  # type: ignore[n
         add_hinge_bending(physics, block, modes, cables, x, R, r)
     if active(physics[block + ROLL_STIFFNESS]):
         add_hinge_roll(physics, block, modes, x, R, r)
-    if active(physics[block + TORSION]):
+    if _any_active(physics, block + TORSION, 4):
         add_cable_torsion(physics, block, modes, cables, x, R, r)
     if active(physics[block + LINEAR_DENSITY]):
         add_cable_mass(physics, block, modes, cables, x, R, K, r)

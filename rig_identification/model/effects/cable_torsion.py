@@ -1,13 +1,17 @@
 """Cables that resist being twisted: a rope between two clamps turns its end back, about itself.
 
-With R_0 the pose at rest, where the cables hang untwisted, the body is turned by A = R R_0^T. Of that turn
-w = vee(A - A^T)/2, for small turns its rotation vector, cable i (direction u_i, ceiling to body) is
-twisted by s_i = w . u_i, what is bent or leans about its hinges being free. It stores V = 1/2 k s_i^2. From
+With R_0 the pose at rest the body is turned by A = R R_0^T. Of that turn w = vee(A - A^T)/2, for small
+turns its rotation vector, cable i (direction u_i, ceiling to body) is twisted by s_i = w . u_i, what is bent
+or leans about its hinges being free. Its clamps were tightened with the body held otherwise than it hangs:
+untwisted it would be with the body turned by -c, and to first order in c it stores
+    V = 1/2 k s_i^2 + s_i p_i,      p_i = q . u_i,      q = k c.
+With q, in N m, for a number rather than c all is linear in the two. From
     [phi]A + A^T[phi] = [(tr(A) 1 - A) phi]     for any phi
 a turn of the body by phi changes w by (tr(A) 1 - A) phi / 2, and a move of its hinge by d changes u_i by
-(1 - u_i u_i^T) d / L_i, so that on the body act
-    at the hinge   f_i = -k s_i (w - s_i u_i) / L_i,      besides   m_i = -k s_i (tr(A) u_i - A^T u_i) / 2,
-which for small turns is the moment -k (w . u_i) u_i alone. About the vertical n cables add n k to what turns
+(1 - u_i u_i^T) d / L_i, so that on the body act, with t_i = k s_i + p_i,
+    at the hinge   f_i = -[t_i (w - s_i u_i) + s_i (q - p_i u_i)] / L_i,
+    besides        m_i = -t_i (tr(A) u_i - A^T u_i) / 2,
+which for small turns is the moment -t_i u_i alone. About the vertical n cables add n k to what turns
 the body back: at one frequency nothing tells that from less inertia.
 """
 
@@ -15,8 +19,9 @@ from __future__ import annotations
 
 from numba import njit
 
+from rig_identification.model.cable_line import in_body
 from rig_identification.model.effects.direction import cable_direction
-from rig_identification.model.effects.place import REFERENCE_ROTATION, TORSION, active
+from rig_identification.model.effects.place import REFERENCE_ROTATION, TORSION, TWISTED, active
 from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, SLACK
 
 
@@ -24,8 +29,10 @@ from rig_identification.model.layout import BODY_POINT, CABLE_SIZE, CABLES, SLAC
 def add_cable_torsion(physics, block, modes, cables, x, R, r):  # type: ignore[no-untyped-def]
     """Add the wrench of some twisted cables to r, in body axes: there A is R_0^T R."""
     stiffness = physics[block + TORSION]
-    if not active(stiffness):
+    q0, q1, q2 = physics[block + TWISTED], physics[block + TWISTED + 1], physics[block + TWISTED + 2]
+    if not (active(stiffness) or active(q0) or active(q1) or active(q2)):
         return
+    qx, qy, qz = in_body(R, q0, q1, q2)
     t = block + REFERENCE_ROTATION
     rest = physics[t : t + 9].reshape(3, 3)
     a00 = rest[0, 0] * R[0, 0] + rest[1, 0] * R[1, 0] + rest[2, 0] * R[2, 0]
@@ -46,10 +53,12 @@ def add_cable_torsion(physics, block, modes, cables, x, R, r):  # type: ignore[n
         bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
         ux, uy, uz, per_length = cable_direction(physics, o, x[0], x[1], x[2], R)
         twist = wx * ux + wy * uy + wz * uz
-        moment, half = -stiffness * twist, -0.5 * stiffness * twist
-        fx = moment * per_length * (wx - twist * ux)
-        fy = moment * per_length * (wy - twist * uy)
-        fz = moment * per_length * (wz - twist * uz)
+        clamped = qx * ux + qy * uy + qz * uz
+        moment = -stiffness * twist - clamped
+        half = 0.5 * moment
+        fx = per_length * (moment * (wx - twist * ux) - twist * (qx - clamped * ux))
+        fy = per_length * (moment * (wy - twist * uy) - twist * (qy - clamped * uy))
+        fz = per_length * (moment * (wz - twist * uz) - twist * (qz - clamped * uz))
         r[0] += fx
         r[1] += fy
         r[2] += fz

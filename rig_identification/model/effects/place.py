@@ -26,19 +26,20 @@ TETHER_PULL = 15  # 3: N, world axes
 LAW_SPRING = 18  # 3: N/m, N/m^2, N/m^3
 LAW_BRAKE = 21  # 2: N s/m, N s^2/m^2
 TORSION = 23  # N m/rad, each cable
-TETHER_POINT = 24  # 3: m, body
-REFERENCE_POSITION = 27  # 3: m, world
-REFERENCE_ROTATION = 30  # 9: rotation matrix, row by row
-ROLL_AXIS = 39  # 3: unit vector in body, a constant of the session like the reference pose
-ROLL_SKEW = 42  # tangent of the angle about the vertical between ROLL_AXIS and the axis that hinges hold
-PLATE_REACH = 43  # m, a constant of the session
-SHARING = 44  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
-CREEP = 45  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
-TETHER_REACH = 46  # 3: m, world: from the body's point at rest to the wall; all 0: a spring on each axis
-LAW_POINT = 49  # 3: m, body
-LAW_DIRECTION = 52  # 2: rad, azimuth and elevation of the spring's line in the world
-LAW_NARROW = 54  # 1/m^2: how fast the brake fades away from where its point hangs at rest
-EFFECTS_SIZE = 55
+TWISTED = 24  # 3: N m, world axes: moment with which cables are twisted at rest
+TETHER_POINT = 27  # 3: m, body
+REFERENCE_POSITION = 30  # 3: m, world
+REFERENCE_ROTATION = 33  # 9: rotation matrix, row by row
+ROLL_AXIS = 42  # 3: unit vector in body, a constant of the session like the reference pose
+ROLL_SKEW = 45  # tangent of the angle about the vertical between ROLL_AXIS and the axis that hinges hold
+PLATE_REACH = 46  # m, a constant of the session
+SHARING = 47  # m/s^2 per N: how softly redundant rigid cables share the load (dynamics.py)
+CREEP = 48  # rad/s: rate of a hinge below which its friction grows with the rate instead of jumping
+TETHER_REACH = 49  # 3: m, world: from the body's point at rest to the wall; all 0: a spring on each axis
+LAW_POINT = 52  # 3: m, body
+LAW_DIRECTION = 55  # 2: rad, azimuth and elevation of the spring's line in the world
+LAW_NARROW = 57  # 1/m^2: how fast the brake fades away from where its point hangs at rest
+EFFECTS_SIZE = 58
 
 
 def effects_block(cables: int) -> int:
