@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 from rig_identification.estimate.sampling import (
     Grid,
     Sampler,
+    cubic_error,
     group_by_node,
     interpolation,
     jumps_of,
@@ -20,6 +21,7 @@ from rig_identification.estimate.sampling import (
     rate_noise,
     sample_noise_std,
     smoothed_input,
+    worst_cubic_error,
 )
 
 GRID = Grid(0.01, 201)
@@ -181,3 +183,21 @@ def test_a_step_is_found_and_where() -> None:
     jumps = jumps_of(node_values(grid, time, force[:, None]), 0.5)
     assert np.all(np.abs(grid.step * np.flatnonzero(jumps) - 2.5) <= 3.0 * grid.step)
     assert np.sum(jumps) == pytest.approx(300.0, rel=0.15)
+
+
+def test_what_rings_away_at_the_start_is_not_followed_though_it_is_little_of_the_run() -> None:
+    time, noise, step = np.arange(0.02, 32.0, 0.002), np.array([1.0]), 0.01
+    white = np.random.default_rng(4).normal(0.0, 1.0, (time.size, 1))
+    swing = (1e3 * np.sin(2.0 * np.pi * 1.3 * time))[:, None]
+    ringing = (200.0 * np.exp(-time / 0.7) * np.cos(2.0 * np.pi * 16.0 * time))[:, None]
+    assert np.all(worst_cubic_error(time, swing + white, noise, step) < 0.8)
+    assert np.all(cubic_error(time, swing + ringing + white, noise, step) < 0.1)
+    told = worst_cubic_error(time, swing + ringing + white, noise, step)
+    assert np.all(told > 1.0)
+    # What a cubic between nodes makes of the ring itself, in its first second, is within a factor of that
+    between = Sampler(Grid(step, 3201), time, np.arange(time.size), time.size).at()[0]
+    nodes = step * np.arange(3201)
+    ring = 200.0 * np.exp(-nodes / 0.7) * np.cos(2.0 * np.pi * 16.0 * nodes)
+    first = time < 1.0
+    missed = np.sqrt(np.mean((between @ ring - ringing[:, 0])[first] ** 2))
+    assert 0.3 * missed < float(told[0]) < 3.0 * missed

@@ -30,7 +30,9 @@ def test_a_swing_on_cables_that_twist_keeps_its_energy() -> None:
     sample = thesis_case_14()
     plain = sample.model(rods=True)
     turned = Rotation.from_rotvec([0.1, -0.05, 0.4]).as_matrix() @ sample.start.R_world_body
-    model = having(plain.referred(replace(sample.start, R_world_body=turned)), TORSION=STIFFNESS, TWISTED=TWISTS)
+    model = having(
+        plain.referred(replace(sample.start, R_world_body=turned)), TORSION=STIFFNESS, TWISTED=TWISTS
+    )
     motion = simulate(model, sample.start, Input.none(501, 0.01), substeps=8)
     stored = []
     for x, R in zip(motion.states, motion.R_world_body, strict=True):
@@ -86,7 +88,7 @@ def test_cables_that_twist_are_found_as_stiff_and_as_twisted_as_they_are(twist: 
     spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
     problem, found = seen_by_the_true_body(spec, 3)
     promises = screen(problem, found, catalogue(problem), mass_of(problem, found))
-    torsion = next(p for p in promises if p.candidate.where.get("law") == "torsion of the cables")
+    torsion = next(p for p in promises if p.candidate.where.get("state") == "twisted at rest")
     begun = attempt(problem, found, torsion)
     ended = None if begun is None else finished(begun)
     assert ended is not None

@@ -19,6 +19,7 @@ from rig_identification.estimate.sampling import (
     group_by_node,
     node_input,
     noise_felt,
+    worst_cubic_error,
 )
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
@@ -34,8 +35,9 @@ LONG_RUN = 150.0
 #: Where the force is sampled more seldom than this, in wide node steps, nodes lie as far apart as its
 #: samples: the error of a sample lasts until the next one, and is white only from node to node.
 SELDOM = 1.5
-#: Root mean square error of that cubic, in units of one sample's noise, up to which it follows.
-FOLLOWED = 0.1
+#: Root mean square error of that cubic, in units of one sample's noise, up to which it follows: of a whole
+#: run, and of its worst second, in which 0.8 is still chance.
+FOLLOWED, FOLLOWED_AT_WORST = 0.1, 1.0
 #: Node spacing where a run is only watched: no device follows more than the swing itself, whose pose a
 #: cubic through such nodes holds to 1e-4 at 1.5 Hz.
 WATCHED_NODE_STEP = 0.025
@@ -225,7 +227,9 @@ def _follows(rig: Rig, name: str, series: Series, step: float) -> bool:
     if series.time.size < 16:
         return True
     noise, _ = noise_std(rig, name, series.time, series.values)
-    return bool(np.all(cubic_error(series.time, series.values, noise, step) < FOLLOWED * noise))
+    all_of_it = cubic_error(series.time, series.values, noise, step) < FOLLOWED * noise
+    at_worst = worst_cubic_error(series.time, series.values, noise, step) < FOLLOWED_AT_WORST * noise
+    return bool(np.all(all_of_it & at_worst))
 
 
 def away_from_jumps(run: Run) -> Run:

@@ -106,7 +106,8 @@ class PlantEffects:
 def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     """The same rig with ``effects``.
 
-    A tether pulls as told, cables are twisted as told, and a rider's spring bears its weight, where the rig hangs at rest without these.
+    A tether pulls and cables are twisted as told, and a rider's spring bears its weight, where the rig hangs
+    at rest without these.
     """
     elastic = _elastic(model, effects)
     physics = _with_rig_errors(elastic, effects)
