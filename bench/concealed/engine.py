@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from bench.concealed.effects.base import Effect, State
@@ -293,10 +294,11 @@ class Engine:
         velocity, reported = rows[:, 7:13], rows[:, 13:19]
         tension = rows[:, 19 : 19 + self.cables]
         taut = tension > 0.0 if any(e.lets_go for e in self.effects) else np.ones(tension.shape, dtype=bool)
-        moved = np.gradient(velocity, STEP * RECORD_EVERY, axis=0)
-        # One-sided differences at the ends are of lower order; a difference across a snap is none
+        # Through five samples: between neighbours it takes 0.2 % off what rings at 16 Hz, 2 % at 52 Hz
+        moved = savgol_filter(velocity, 5, 4, deriv=1, delta=STEP * RECORD_EVERY, axis=0)
+        # At the ends it is of lower order; a difference across a snap is none
         told = _near(np.any(taut[1:] != taut[:-1], axis=1), SNAP)
-        told[[0, -1]] = True
+        told[[0, 1, -2, -1]] = True
         moved[told] = reported[told]
         missed = moved - reported
         rotation = Rotation.from_quat(quaternion).as_matrix()
