@@ -29,6 +29,7 @@ class Candidate:
     advice: str  # what to do about it
     where: dict[str, object] = field(default_factory=dict)
     positive: int = 0  # so many of the first parameters cannot be negative
+    either_way: int = 0  # so many after them are amounts as well, of either sign
     tell: Callable[[dict[str, float], dict[str, float]], Told] | None = None  # from values and stds by name
     name_in_result: str = ""  # of the first parameter, where ``tell`` is not given
     build: Build | None = None  # where the effect changes more than numbers
@@ -39,6 +40,7 @@ class Candidate:
     closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
     curved: bool = False  # its amounts bend the valleys of a fit: a force by a power of the motion
     everywhere: bool = False  # every rig has some of it: only how much is a question
+    of_its_amount: bool = False  # its other numbers are nothing without its amount, which has to show
     places: int = 1  # at which the effect is asked for, this one among them
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 

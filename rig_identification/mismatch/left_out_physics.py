@@ -129,6 +129,7 @@ def _cable_torsion(weight: float, block: int) -> list[Candidate]:
     """Cables that resist being twisted: untwisted at rest, or clamped with the body held otherwise.
 
     weight: N. Most of what cables do so does not show; three numbers more, which they may not need, hide it.
+    Nor do these stand for a moment at rest by themselves, as a hose's pull has.
     """
     stiff = TWISTED * weight
     stiffness = added("cable.torsion", "N*m/rad", stiff, block + place.TORSION)
@@ -152,6 +153,7 @@ def _cable_torsion(weight: float, block: int) -> list[Candidate]:
             positive=1,
             tell=told,
             everywhere=True,
+            of_its_amount=bool(more),
         )
         for more, state in (((), {}), (twists, {"state": "twisted at rest"}))
     ]

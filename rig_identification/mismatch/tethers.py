@@ -129,6 +129,7 @@ def _tether(axes: str, rig: Rig, mass: float) -> Candidate:
         ADVICE,
         {"channel": None, "axis": axes if len(axes) == 1 else None},
         positive=len(axes),
+        either_way=len(axes),
         tell=partial(_told, axes),
         closer=partial(_hoses, mass),
     )
@@ -147,6 +148,7 @@ def _hose(axis: str, side: float, rig: Rig, mass: float) -> Candidate:
         ADVICE,
         {"channel": None, "axis": axis},
         positive=1,
+        either_way=1,
         tell=partial(_told, axis),
     )
 

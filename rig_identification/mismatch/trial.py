@@ -183,7 +183,7 @@ def attempt(
     budget: Budget = UNLIMITED,
     growing: bool = False,
 ) -> Trial | None:
-    """A first, short fit of one hypothesis from what screening promised; None where it cannot start.
+    """A first, short fit of one hypothesis from what screening promised; None where it cannot start or be.
 
     It ends where the ``budget`` is spent. growing: over the first instants before all of the runs, as what
     changes the model is fitted: from a body that is far off whole pieces lead into another valley.
@@ -207,7 +207,8 @@ def attempt(
             )
     except FloatingPointError:
         return None
-    return Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+    trial = Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
+    return None if _without_its_amount(trial) else trial
 
 
 def fitted_from(
@@ -394,7 +395,17 @@ def _closest(trial: Trial, stop: Stop) -> Trial:
 
 def _sensible(trial: Trial) -> bool:
     """Whether what cannot be negative is not, as a trial ends, and what is at a place can be there."""
-    return possible(trial) and (trial.candidate.positive != 1 or all(z >= 0.0 for z in signs(trial)))
+    if not possible(trial) or _without_its_amount(trial):
+        return False
+    return trial.candidate.positive != 1 or all(z >= 0.0 for z in signs(trial))
+
+
+def _without_its_amount(trial: Trial) -> bool:
+    """Whether numbers that are nothing without an amount are there without it, and stand for something else.
+
+    Such a trial is over before what is likelier with it keeps others from being fitted to their end.
+    """
+    return trial.candidate.of_its_amount and not amount_seen(trial)
 
 
 def possible(trial: Trial) -> bool:
@@ -455,8 +466,11 @@ def signs(trial: Trial) -> list[float]:
 
 
 def amount_seen(trial: Trial) -> bool:
-    """Whether any amount that cannot be negative lies clear of none; what has no such amount does."""
-    return max(signs(trial), default=PLAIN) >= PLAIN
+    """Whether any amount lies clear of none, as a hose's pull at rest may; what has no amount does."""
+    candidate = trial.candidate
+    amounts = candidate.parameters[candidate.positive :][: candidate.either_way]
+    seen = in_stds(trial) if amounts else {}
+    return max([*signs(trial), *(abs(seen[p.name]) for p in amounts)], default=PLAIN) >= PLAIN
 
 
 def in_stds(trial: Trial) -> dict[str, float]:
