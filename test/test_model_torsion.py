@@ -16,7 +16,7 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import screen
-from rig_identification.mismatch.trial import attempt, finished, mass_of
+from rig_identification.mismatch.trial import amount_seen, attempt, finished, mass_of
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.effects.cable_torsion import add_cable_torsion
@@ -99,3 +99,17 @@ def test_cables_that_twist_are_found_as_stiff_and_as_twisted_as_they_are(twist: 
     assert list(told) == ["torsion_stiffness", "twist_x", "twist_y", "twist_z"]
     for (value, std, _), true in zip(told.values(), (STIFF, *twist), strict=True):
         assert abs(value - true) < 3.0 * std < STIFF
+
+
+def test_a_hoses_pull_is_no_twist_of_cables_that_do_not_resist_it() -> None:
+    effects = {"tether": (120.0, 0.0, 0.0), "tether_point": (0.3, 1.8, -0.9), "tether_pull": (30.0, 0.0, 0.0)}
+    spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
+    problem, found = seen_by_the_true_body(spec, 3)
+    promises = screen(problem, found, catalogue(problem), mass_of(problem, found))
+    twisted = next(p for p in promises if p.candidate.where.get("state") == "twisted at rest")
+    assert twisted.gain > 10.0
+    assert attempt(problem, found, twisted) is None
+    by_its_pull = replace(twisted, candidate=replace(twisted.candidate, of_its_amount=False))
+    begun = attempt(problem, found, by_its_pull)
+    assert begun is not None
+    assert not amount_seen(begun)
