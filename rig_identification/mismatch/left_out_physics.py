@@ -143,11 +143,15 @@ def _cable_torsion(weight: float, block: int) -> list[Candidate]:
         names |= {f"twist_{q.name[-1]}": q for q in twists if q.name in values}
         return {name: (values[q.name], stds[q.name], q.unit) for name, q in names.items()}
 
+    askew = (
+        ". Clamped with the body held otherwise than it hangs, they are twisted at rest, each by its share "
+        "of {told[twist_x]}, {told[twist_y]} and {told[twist_z]} about the world's axes"
+    )
     return [
         Candidate(
             "unknown",
             (stiffness, *more),
-            "The cables resist being twisted: each turns the body back by {value} about itself.",
+            f"The cables resist being twisted: each turns the body back by {{value}} about itself{hung}.",
             "Hang the cables on swivels; what twists them looks like less inertia at any one frequency.",
             {"channel": None, "axis": None, "law": "torsion of the cables", **state},
             positive=1,
@@ -155,7 +159,7 @@ def _cable_torsion(weight: float, block: int) -> list[Candidate]:
             everywhere=True,
             of_its_amount=bool(more),
         )
-        for more, state in (((), {}), (twists, {"state": "twisted at rest"}))
+        for more, state, hung in (((), {}, ""), (twists, {"state": "twisted at rest"}, askew))
     ]
 
 
