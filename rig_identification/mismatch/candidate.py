@@ -40,7 +40,7 @@ class Candidate:
     closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
     curved: bool = False  # its amounts bend the valleys of a fit: a force by a power of the motion
     everywhere: bool = False  # every rig has some of it: only how much is a question
-    of_its_amount: bool = False  # its other numbers are nothing without its amount, which has to show
+    per_amount: float = 0.0  # its other numbers come to no more than so much of the first; 0: to anything
     places: int = 1  # at which the effect is asked for, this one among them
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 

@@ -31,6 +31,8 @@ CREEP_SPREAD = 1.1
 TWISTED = 0.005
 #: rad between how the body hangs and how it was held when the cables were clamped: it may lean by so much.
 CLAMPED = 0.1
+#: ... and no body is held further askew than this.
+ASKEW = 3.0 * CLAMPED
 #: kg/m: what hangs a body is what is at hand, and strong enough many times over, however light the body is. A
 #: wire rope of 16 mm weighs 1 kg/m, a chain of 13 mm 3.8 kg/m.
 HEAVY_CABLE = 1.0
@@ -157,7 +159,7 @@ def _cable_torsion(weight: float, block: int) -> list[Candidate]:
             positive=1,
             tell=told,
             everywhere=True,
-            of_its_amount=bool(more),
+            per_amount=ASKEW if more else 0.0,
         )
         for more, state, hung in (((), {}, ""), (twists, {"state": "twisted at rest"}, askew))
     ]

@@ -401,11 +401,16 @@ def _sensible(trial: Trial) -> bool:
 
 
 def _without_its_amount(trial: Trial) -> bool:
-    """Whether numbers that are nothing without an amount are there without it, and stand for something else.
+    """Whether numbers that come of an amount are larger than it can make them, and stand for something else.
 
     Such a trial is over before what is likelier with it keeps others from being fitted to their end.
     """
-    return trial.candidate.of_its_amount and not amount_seen(trial)
+    most = trial.candidate.per_amount
+    if most == 0.0:
+        return False
+    values = trial.problem.bench.parameters.named(trial.evaluation.point.theta)
+    amount, *others = (values[q.name] for q in trial.candidate.parameters)
+    return bool(np.linalg.norm(others) > most * amount)
 
 
 def possible(trial: Trial) -> bool:
