@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 pytest.importorskip("mujoco", reason="MuJoCo is missing: THE MODEL IS NOT SET BESIDE IT (pip install mujoco)")
 
+from test_model_rigs import elements_of
+
 from bench.concealed.draw import draw_scene
 from bench.concealed.effects.ceiling_compliance import CeilingCompliance
 from bench.concealed.engine import Engine
@@ -24,8 +26,8 @@ AXIS, STIFFNESS, SHARE, DAMPING_RATIO = 0, 2e7, 0.3, 0.01
 
 def true_model(scene: Scene) -> RigModel:
     """The model with the numbers that the engine has, instead of those that a lab describes."""
-    body, inertia = scene.body, scene.body.inertia[np.triu_indices(3)]
-    model = rig_model(scene.rig, np.array([body.mass, *body.center_of_mass, *inertia]))
+    body = scene.body
+    model = rig_model(scene.rig, elements_of(body.mass, body.center_of_mass, body.inertia))
     physics = model.physics.copy()
     geometry = scene.geometry
     for i, (top, hinge, length) in enumerate(

@@ -16,7 +16,7 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import screen
-from rig_identification.mismatch.trial import attempt, finished, mass_of
+from rig_identification.mismatch.trial import attempt, fitted_to_its_end, mass_of
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.effects.cable_torsion import add_cable_torsion
@@ -89,8 +89,7 @@ def test_cables_that_twist_are_found_as_stiff_and_as_twisted_as_they_are(twist: 
     problem, found = seen_by_the_true_body(spec, 3)
     promises = screen(problem, found, catalogue(problem), mass_of(problem, found))
     torsion = next(p for p in promises if p.candidate.where.get("state") == "twisted at rest")
-    begun = attempt(problem, found, torsion)
-    ended = None if begun is None else finished(begun)
+    ended = fitted_to_its_end(problem, found, torsion)
     assert ended is not None
     assert found.cost - ended.evaluation.cost > 1.0
     found_at = {q.name: q for q in parameter_estimates(ended.problem, ended.evaluation)}

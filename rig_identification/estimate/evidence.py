@@ -227,9 +227,10 @@ def _follows(rig: Rig, name: str, series: Series, step: float) -> bool:
     if series.time.size < 16:
         return True
     noise, _ = noise_std(rig, name, series.time, series.values)
-    all_of_it = cubic_error(series.time, series.values, noise, step) < FOLLOWED * noise
-    at_worst = worst_cubic_error(series.time, series.values, noise, step) < FOLLOWED_AT_WORST * noise
-    return bool(np.all(all_of_it & at_worst))
+    if not np.all(cubic_error(series.time, series.values, noise, step) < FOLLOWED * noise):
+        return False
+    worst = worst_cubic_error(series.time, series.values, noise, step)
+    return bool(np.all(worst < FOLLOWED_AT_WORST * noise))
 
 
 def away_from_jumps(run: Run) -> Run:

@@ -313,10 +313,7 @@ def cubic_error(time: Array, values: Array, noise: Array, step: float) -> Array:
     """
     count = time.size
     rate = (count - 1) / max(float(time[-1] - time[0]), 1e-9)
-    window = np.hanning(count)
-    centred = (values - np.mean(values, axis=0)) * window[:, None]
-    # Variance in each line, one-sided, window undone
-    power = 2.0 * np.abs(np.fft.rfft(centred, axis=0)) ** 2 / (count * np.sum(window**2))
+    power = _power(values.T).T
     frequency = np.fft.rfftfreq(count, 1.0 / rate)
     width = max(1, round(AVERAGED_OVER * count / rate))
     power = uniform_filter1d(power, width, axis=0)
@@ -337,12 +334,16 @@ def worst_cubic_error(time: Array, values: Array, noise: Array, step: float) -> 
     if count < FEW:
         return cubic_error(time, values, noise, step)
     windows = np.lib.stride_tricks.sliding_window_view(values, count, axis=0)[:: max(1, count // 2)]
-    shape = np.hanning(count)
-    centred = (windows - np.mean(windows, axis=-1, keepdims=True)) * shape
-    power = 2.0 * np.abs(np.fft.rfft(centred, axis=-1)) ** 2 / (count * np.sum(shape**2))
     missed = _missed(np.fft.rfftfreq(count, 1.0 / rate), step) ** 2
-    signal = (power - (2.0 * noise**2 / count)[:, None]) @ missed
+    signal = (_power(windows) - (2.0 * noise**2 / count)[:, None]) @ missed
     return np.asarray(np.sqrt(np.maximum(0.0, np.max(signal, axis=0))))
+
+
+def _power(values: Array) -> Array:
+    """(..., lines) variance in each line of values (..., n), one-sided, a Hann window undone."""
+    window = np.hanning(values.shape[-1])
+    centred = (values - np.mean(values, axis=-1, keepdims=True)) * window
+    return np.asarray(2.0 * np.abs(np.fft.rfft(centred)) ** 2 / (window.size * np.sum(window**2)))
 
 
 def _missed(frequency: NDArray[np.floating[Any]], step: float) -> Array:

@@ -208,7 +208,7 @@ def attempt(
     except FloatingPointError:
         return None
     trial = Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
-    return None if _without_its_amount(trial) else trial
+    return None if _beyond_its_amount(trial) else trial
 
 
 def fitted_from(
@@ -395,12 +395,12 @@ def _closest(trial: Trial, stop: Stop) -> Trial:
 
 def _sensible(trial: Trial) -> bool:
     """Whether what cannot be negative is not, as a trial ends, and what is at a place can be there."""
-    if not possible(trial) or _without_its_amount(trial):
+    if not possible(trial) or _beyond_its_amount(trial):
         return False
     return trial.candidate.positive != 1 or all(z >= 0.0 for z in signs(trial))
 
 
-def _without_its_amount(trial: Trial) -> bool:
+def _beyond_its_amount(trial: Trial) -> bool:
     """Whether numbers that come of an amount are larger than it can make them, and stand for something else.
 
     Such a trial is over before what is likelier with it keeps others from being fitted to their end.
