@@ -9,7 +9,8 @@ import pytest
 from test_mismatch_two_errors import wrong
 from test_simulate_identify import shaken
 
-from rig_identification.estimate.identify import ORDINARY, fit_session, near_noise, parameter_estimates
+from rig_identification.estimate.estimates import parameter_estimates
+from rig_identification.estimate.identify import ORDINARY, fit_session, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.hypotheses import catalogue, count_of, needed_gain, worth_a_fit

@@ -13,7 +13,7 @@ from test_model_rigs import moving, random_sample, thesis_case_14
 from test_model_threads import cables_in_body, having
 from test_simulate_identify import seen_by_the_true_body, shaken
 
-from rig_identification.estimate.identify import parameter_estimates
+from rig_identification.estimate.estimates import estimates
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import attempt, fitted_to_its_end, mass_of
@@ -92,9 +92,7 @@ def test_cables_that_twist_are_found_as_stiff_and_as_twisted_as_they_are(twist: 
     ended = fitted_to_its_end(problem, found, torsion)
     assert ended is not None
     assert found.cost - ended.evaluation.cost > 1.0
-    found_at = {q.name: q for q in parameter_estimates(ended.problem, ended.evaluation)}
-    names = [q.name for q in ended.candidate.parameters]
-    told = ended.candidate.told(*({n: getattr(found_at[n], k) for n in names} for k in ("value", "std")))
+    told = ended.candidate.told(estimates(ended.problem, ended.evaluation))
     assert list(told) == ["torsion_stiffness", "twist_x", "twist_y", "twist_z"]
     for (value, std, _), true in zip(told.values(), (STIFF, *twist), strict=True):
         assert abs(value - true) < 3.0 * std < STIFF

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from rig_identification.errors import InputError
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
+from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
 from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
-from rig_identification.estimate.observability import inertial_estimate, invert_information
+from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.rest_evidence import prepare_rest
@@ -42,7 +43,6 @@ from rig_identification.result import (
     ChannelFit,
     Identification,
     Mismatch,
-    ParameterEstimate,
 )
 
 Array = NDArray[np.float64]
@@ -277,20 +277,6 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         start.held_parts,
         lost,
     )
-
-
-def parameter_estimates(problem: Problem, evaluation: Evaluation) -> tuple[ParameterEstimate, ...]:
-    """Every doubt about the rig: what was believed and what the recordings made of it."""
-    parameters = problem.bench.parameters
-    covariance = invert_information(evaluation.information)
-    values = parameters.values(evaluation.point.theta)
-    out = []
-    for i, p in enumerate(parameters.free):
-        std = p.slope(evaluation.point.theta[INERTIAL + i]) * float(
-            np.sqrt(covariance[INERTIAL + i, INERTIAL + i])
-        )
-        out.append(ParameterEstimate(p.name, p.unit, p.nominal, p.slope(0.0), float(values[i]), std))
-    return tuple(out)
 
 
 @dataclass(frozen=True)

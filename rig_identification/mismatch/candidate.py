@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.model.motion import RigModel
@@ -30,7 +31,7 @@ class Candidate:
     where: dict[str, object] = field(default_factory=dict)
     positive: int = 0  # so many of the first parameters cannot be negative
     either_way: int = 0  # so many after them are amounts as well, of either sign
-    tell: Callable[[dict[str, float], dict[str, float]], Told] | None = None  # from values and stds by name
+    tell: Callable[[Estimates], Told] | None = None
     name_in_result: str = ""  # of the first parameter, where ``tell`` is not given
     build: Build | None = None  # where the effect changes more than numbers
     #: Start states, or a body, that suit the changed model, from a fit without it
@@ -74,12 +75,12 @@ class Candidate:
         """The model with the effect in it and the effect's parameters there."""
         return (model, self.parameters) if self.build is None else self.build(model)
 
-    def told(self, values: dict[str, float], stds: dict[str, float]) -> Told:
+    def told(self, found: Estimates) -> Told:
         """The parameters as the contract names them."""
         if self.tell is not None:
-            return self.tell(values, stds)
+            return self.tell(found)
         first = self.parameters[0]
-        return {self.name_in_result: (values[first.name], stds[first.name], first.unit)}
+        return {self.name_in_result: (*found.of(first.name), first.unit)}
 
 
 def added(name: str, unit: str, std: float, entry: int, nominal: float = 0.0) -> Parameter:

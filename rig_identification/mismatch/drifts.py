@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import sensors
@@ -49,12 +50,13 @@ def _drift(
 ) -> Candidate:
     rate, settling = own
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        numbers = np.array([values[rate.name], values[settling.name]])
-        moved, slopes = sensors.drift(np.array([duration]), numbers)
+    def moved(*numbers: float) -> float:
+        return float(sensors.drift(np.array([duration]), np.array(numbers))[0][0, 0])
+
+    def told(found: Estimates) -> Told:
         return {
-            "drift": (float(moved[0, 0]), float(slopes()[0, 0, 0] * stds[rate.name]), unit),
-            "settling_rate": (values[settling.name], stds[settling.name], "1/s"),
+            "drift": (*found.following(moved, rate.name, settling.name), unit),
+            "settling_rate": (*found.of(settling.name), "1/s"),
         }
 
     which = f"{str(where['quantity']).replace('_', ' ')} {where['axis'] or ''}".strip()

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.identify import parameter_estimates
+from rig_identification.estimate.estimates import Estimates, estimates
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Told
 from rig_identification.mismatch.experiments import experiment_for
@@ -36,24 +36,23 @@ def called(effect: str, where: Mapping[str, object]) -> str:
 
 def finding(
     trial: Trial,
-    values: dict[str, float],
-    stds: dict[str, float],
+    found: Estimates,
     evidence: dict[str, float | None],
 ) -> Finding:
     """The finding that a trial's effect amounts to.
 
-    values, stds: of all parameters of the whole fit by name. evidence: see explained.evidence_of.
+    found: all parameters of the whole fit. evidence: see explained.evidence_of.
     """
     candidate = trial.candidate
-    told = candidate.told(values, stds)
+    told = candidate.told(found)
     shown = {
         name: f"{value:.4g} ± {std:.2g}" + ("" if unit == "1" else f" {unit}")
         for name, (value, std, unit) in told.items()
     }
     where = dict(candidate.where)
     for place in (f"{candidate.effect}.point", f"{candidate.effect}.position"):
-        if f"{place}.x" in values:
-            where["position"] = [float(values[f"{place}.{a}"]) for a in "xyz"]
+        if f"{place}.x" in found.values:
+            where["position"] = [found.values[f"{place}.{a}"] for a in "xyz"]
     if candidate.effect == "imu_misalignment":
         where["axis"] = max("xyz", key=lambda a: abs(told[f"angle_{a}"][0]))
     first = next(iter(shown.values()))
@@ -92,13 +91,11 @@ def with_mended(mismatch: Mismatch, found: Sequence[Finding], so: str) -> Mismat
 
 def rival(trial: Trial, gap: float) -> dict[str, object]:
     """An entry of ``alternatives``: a hypothesis that trails what is told by ``gap`` nats."""
-    estimates = parameter_estimates(trial.problem, trial.evaluation)
-    values, stds = {p.name: p.value for p in estimates}, {p.name: p.std for p in estimates}
     return {
         "effect": trial.candidate.effect,
         "where": dict(trial.candidate.where),
         "log_likelihood_gap": float(gap),
-        "parameters": written(trial.candidate.told(values, stds)),
+        "parameters": written(trial.candidate.told(estimates(trial.problem, trial.evaluation))),
         "experiment": experiment_for(trial.candidate.kind),
     }
 

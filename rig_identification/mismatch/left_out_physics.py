@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL, ParameterSet
 from rig_identification.estimate.solve import Evaluation, Point, Problem
@@ -51,10 +52,10 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     size = float(np.max(extent(rig)))
     speed = np.sqrt(rig.gravity * length)
 
-    def rubbing(values: dict[str, float], stds: dict[str, float]) -> Told:
+    def rubbing(found: Estimates) -> Told:
         return {
-            "torque": (values["hinge.friction"], stds["hinge.friction"], "N*m"),
-            "creep_rate": (values["hinge.creep"], stds["hinge.creep"], "rad/s"),
+            "torque": (*found.of("hinge.friction"), "N*m"),
+            "creep_rate": (*found.of("hinge.creep"), "rad/s"),
         }
 
     out = [
@@ -140,10 +141,10 @@ def _cable_torsion(weight: float, block: int) -> list[Candidate]:
         for i, axis in enumerate("xyz")
     )
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
+    def told(found: Estimates) -> Told:
         names = {"torsion_stiffness": stiffness}
-        names |= {f"twist_{q.name[-1]}": q for q in twists if q.name in values}
-        return {name: (values[q.name], stds[q.name], q.unit) for name, q in names.items()}
+        names |= {f"twist_{q.name[-1]}": q for q in twists if q.name in found.values}
+        return {name: (*found.of(q.name), q.unit) for name, q in names.items()}
 
     askew = (
         ". Clamped with the body held otherwise than it hangs, they are twisted at rest, each by its share "
@@ -198,8 +199,8 @@ def _gyroscopic_term(block: int, lacking: float) -> Candidate:
     """The gyroscopic moment, where the ideal model lacks a share of it: in nature none is missing."""
     share = added("gyroscopic_share", "1", 1.0, block + place.GYROSCOPIC_SHARE, lacking)
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        return {"share": (1.0 - values[share.name], stds[share.name], "1")}
+    def told(found: Estimates) -> Told:
+        return {"share": (*found.following(lambda lacking: 1.0 - lacking, share.name), "1")}
 
     return Candidate(
         "gyroscopic_term",

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES, Parameter
@@ -134,12 +135,12 @@ def _point(rig: Rig, scales: Scales) -> tuple[Parameter, ...]:
     )
 
 
-def _told(values: dict[str, float], stds: dict[str, float]) -> Told:
+def _told(found: Estimates) -> Told:
     """Every number of a law that is in the model."""
-    names = [n for n in values if n.startswith("unknown.")]
+    names = [n for n in found.values if n.startswith("unknown.")]
     units = dict((*SPRINGS, *BRAKES, ("narrow", "1/m^2"), ("azimuth", "rad"), ("elevation", "rad")))
     return {
-        (short := n.removeprefix("unknown.").replace(".", "_")): (values[n], stds[n], units.get(short, "m"))
+        (short := n.removeprefix("unknown.").replace(".", "_")): (*found.of(n), units.get(short, "m"))
         for n in names
     }
 

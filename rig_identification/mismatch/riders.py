@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Problem
@@ -110,15 +111,10 @@ def rider_candidate(
         )
         return model.with_internal(blocks), parameters
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        out: Told = {}
-        for name, unit in (("mass", "kg"), ("frequency", "Hz"), ("damping_ratio", "1")):
-            key = f"{effect}.{name}"
-            out[name] = (values[key], stds[key], unit)
-        for a in AXES:
-            key = f"{effect}.position.{a}"
-            out[f"position_{a}"] = (values[key], stds[key], "m")
-        return out
+    def told(found: Estimates) -> Told:
+        units = {"mass": "kg", "frequency": "Hz", "damping_ratio": "1"}
+        out: Told = {name: (*found.of(f"{effect}.{name}"), unit) for name, unit in units.items()}
+        return out | {f"position_{a}": (*found.of(f"{effect}.position.{a}"), "m") for a in AXES}
 
     thing, advice = {
         "liquid_slosh": (

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, ParameterSet
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.mismatch.sensor_errors import freed
@@ -20,10 +23,8 @@ def _level(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
         if p is None:
             continue
 
-        def angle(
-            values: dict[str, float], stds: dict[str, float], name: str = p.name, sign: float = sign
-        ) -> Told:
-            return {"angle": (sign * values[name] / rig.gravity, stds[name] / rig.gravity, "rad")}
+        def angle(found: Estimates, name: str = p.name, sign: float = sign) -> Told:
+            return {"angle": (*found.following(lambda aside: sign * aside / rig.gravity, name), "rad")}
 
         out.append(
             Candidate(
@@ -71,8 +72,8 @@ def rig_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
     return [*out, *_level(rig, parameters)]
 
 
-def _error(name: str, nominal: float):  # type: ignore[no-untyped-def]
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        return {"error": (values[name] - nominal, stds[name], "m")}
+def _error(name: str, nominal: float) -> Callable[[Estimates], Told]:
+    def told(found: Estimates) -> Told:
+        return {"error": (*found.following(lambda value: value - nominal, name), "m")}
 
     return told

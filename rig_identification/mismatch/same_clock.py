@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.identify import parameter_estimates
+from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.mismatch.trial import Trial
 from rig_identification.recording import Recording
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
+from functools import partial
+
 from scipy.spatial.transform import Rotation
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.rig import Rig
@@ -120,14 +122,15 @@ def _imu(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
     if rig.imu is not None and all(p is not None for p in turned):
         to_imu = Rotation.from_quat(rig.imu.orientation).inv()
 
-        def angle(values: dict[str, float], stds: dict[str, float]) -> Told:
-            turn = to_imu.apply([values[f"imu.orientation.{a}"] for a in AXES])
-            spread = float(np.mean([stds[f"imu.orientation.{a}"] for a in AXES]))
-            axis = int(np.argmax(np.abs(turn)))
-            told: Told = {"angle": (float(turn[axis]), spread, "rad")}
-            for i, a in enumerate(AXES):
-                told[f"angle_{a}"] = (float(turn[i]), spread, "rad")
-            return told
+        def about(axis: int, *turn: float) -> float:
+            return float(to_imu.apply(turn)[axis])
+
+        def angle(found: Estimates) -> Told:
+            names = [f"imu.orientation.{a}" for a in AXES]
+            own: Told = {
+                f"angle_{a}": (*found.following(partial(about, i), *names), "rad") for i, a in enumerate(AXES)
+            }
+            return {"angle": max(own.values(), key=lambda told: abs(told[0])), **own}
 
         out.append(
             Candidate(
@@ -177,10 +180,9 @@ def _clocks_and_exciter(parameters: ParameterSet) -> list[Candidate]:
     gain = freed(parameters, "exciter.gain", RANGE["gain"])
     if gain is not None:
 
-        def reads_high(values: dict[str, float], stds: dict[str, float]) -> Told:
+        def reads_high(found: Estimates) -> Told:
             # The model multiplies what was measured; the contract asks how much too high it reads
-            factor = values["exciter.gain"]
-            return {"gain": (1.0 / factor - 1.0, stds["exciter.gain"] / factor**2, "1")}
+            return {"gain": (*found.following(lambda factor: 1.0 / factor - 1.0, "exciter.gain"), "1")}
 
         out.append(
             Candidate(

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem
@@ -93,19 +94,14 @@ def ceiling_candidate(
         block = _block(axis, PROBE_DAMPING if probe else DAMPING, frequency)
         return model.with_internal(block), (compliance,) if probe else (compliance, *more)
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        compliance = values[f"ceiling.compliance.{a}"]
-        stiffness = 1.0 / compliance
-        spread = stds[f"ceiling.compliance.{a}"] * stiffness**2
-        omega = 2.0 * np.pi * values[f"ceiling.frequency.{a}"]
-        mass = stiffness / omega**2
-        relative = np.hypot(
-            spread / stiffness, 2.0 * stds[f"ceiling.frequency.{a}"] / values[f"ceiling.frequency.{a}"]
-        )
+    def told(found: Estimates) -> Told:
+        compliance, frequency = f"ceiling.compliance.{a}", f"ceiling.frequency.{a}"
+        # A ring tells stiffness per moving mass: errors of both go along one line
+        mass = found.following(lambda c, f: 1.0 / (c * (2.0 * np.pi * f) ** 2), compliance, frequency)
         return {
-            "stiffness": (stiffness, spread, "N/m"),
-            "mass": (mass, float(mass * relative), "kg"),
-            "damping_ratio": (values[f"ceiling.damping_ratio.{a}"], stds[f"ceiling.damping_ratio.{a}"], "1"),
+            "stiffness": (*found.following(lambda c: 1.0 / c, compliance), "N/m"),
+            "mass": (*mass, "kg"),
+            "damping_ratio": (*found.of(f"ceiling.damping_ratio.{a}"), "1"),
         }
 
     return Candidate(
@@ -151,14 +147,14 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:
             shared("cable.axial_damping", "s", 2.0 * DAMPING / bounce, 1.0, layout.AXIAL_DAMPING),
         )
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        EA, tau = values["cable.axial_stiffness"], values["cable.axial_damping"]
-        omega = np.sqrt(n * EA / length / mass)
-        ratio = 0.5 * tau * omega
-        relative = stds["cable.axial_damping"] / tau
+    def ratio(EA: float, tau: float) -> float:
+        return float(0.5 * tau * np.sqrt(n * EA / length / mass))
+
+    def told(found: Estimates) -> Told:
+        stiffness, damping = "cable.axial_stiffness", "cable.axial_damping"
         return {
-            "axial_stiffness": (EA, stds["cable.axial_stiffness"], "N"),
-            "damping_ratio": (float(ratio), float(ratio * relative), "1"),
+            "axial_stiffness": (*found.of(stiffness), "N"),
+            "damping_ratio": (*found.following(ratio, stiffness, damping), "1"),
         }
 
     return Candidate(

@@ -17,9 +17,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.estimates import Estimates, parameter_estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
-from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
@@ -91,11 +91,11 @@ def _point(rig: Rig) -> tuple[Parameter, ...]:
     )
 
 
-def _told(axes: str, values: dict[str, float], stds: dict[str, float]) -> Told:
+def _told(axes: str, found: Estimates) -> Told:
     """A tether along ``axes`` as the contract names it."""
 
     def of(name: str, unit: str) -> tuple[float, float, str]:
-        return values[f"tether.{name}"], stds[f"tether.{name}"], unit
+        return *found.of(f"tether.{name}"), unit
 
     stiff = {a: of(f"stiffness.{a}", "N/m") for a in axes}
     out: Told = {"stiffness": max(stiff.values(), key=lambda told: abs(told[0]))}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import believed_point
@@ -78,11 +80,10 @@ def _plates(block: int, size: float, face: int) -> Candidate:
         physics[block + place.PLATE_REACH] = reach
         return model.with_physics(physics), (plates,)
 
-    def told(values: dict[str, float], stds: dict[str, float]) -> Told:
-        value, std = values[plates.name], stds[plates.name]
+    def told(found: Estimates) -> Told:
         return {
-            "drag_area": (value, std, "m^2"),
-            "turning_drag": (value * reach**3, std * reach**3, "m^5"),
+            "drag_area": (*found.of(plates.name), "m^2"),
+            "turning_drag": (*found.following(lambda area: area * reach**3, plates.name), "m^5"),
         }
 
     return Candidate(
@@ -99,13 +100,11 @@ def _plates(block: int, size: float, face: int) -> Candidate:
     )
 
 
-def _as_hinges(values: dict[str, float], stds: dict[str, float]) -> Told:
+def _as_hinges(found: Estimates) -> Told:
     """Hinges that hold against rolling: how stiffly, and how far off the line of hinges their axis is."""
-    stiffness, skew = "hinge.roll_stiffness", "hinge.roll_skew"
-    angle = float(np.arctan(values[skew]))
     return {
-        "roll_stiffness": (values[stiffness], stds[stiffness], "N*m/rad"),
-        "axis_angle": (angle, stds[skew] * float(np.cos(angle)) ** 2, "rad"),
+        "roll_stiffness": (*found.of("hinge.roll_stiffness"), "N*m/rad"),
+        "axis_angle": (*found.following(math.atan, "hinge.roll_skew"), "rad"),
     }
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import (
@@ -17,7 +18,6 @@ from rig_identification.estimate.growing import (
     misfit,
     settled_starts,
 )
-from rig_identification.estimate.identify import parameter_estimates
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL

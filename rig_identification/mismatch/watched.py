@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.estimate.cautious import coherence, reweighted, solve_cautiously
+from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
-from rig_identification.estimate.identify import Ideal, Scores, judged, parameter_estimates
+from rig_identification.estimate.identify import Ideal, Scores, judged
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import PIECE, in_pieces
@@ -125,10 +126,9 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     evidence_of_all = log_evidence(whole)
     found = [Trial(c, heavy, whole, evidence_of_all, True) for c in choice.effects]
     after, verdict = judged(fitted)
-    values = {p.name: p.value for p in parameter_estimates(fitted.problem, fitted.evaluation)}
-    stds = {p.name: p.std for p in parameter_estimates(fitted.problem, careful[1])}
+    told = estimates(fitted.problem, fitted.evaluation, spread=careful[1])
     evidence = evidence_of(found_ideal, fitted, after.holdout)
-    findings = [finding(t, values, stds, evidence) for t in found]
+    findings = [finding(t, told, evidence) for t in found]
     hand = hand_finding(ideal)
     if hand is not None:
         findings.append(hand)

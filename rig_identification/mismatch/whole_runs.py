@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.identify import ORDINARY, Ideal, judged, parameter_estimates
+from rig_identification.estimate.identify import ORDINARY, Ideal, judged
 from rig_identification.estimate.solve import Point, Problem
 from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
@@ -141,10 +142,8 @@ def _findings(
     ideal: Ideal, fitted: Fitted, found: list[Trial], after: float | None, loose: float
 ) -> tuple[Finding, ...]:
     """The effects in the recording contract's words. loose: factor on their variances."""
-    parameters = parameter_estimates(fitted.problem, fitted.evaluation)
     evidence = evidence_of(ideal, fitted, after)
-    values = {p.name: p.value for p in parameters}
     # An error beyond what is ordinary comes on top of an ordinary one, and only their sum is seen
     ordinary = {p.name: p.prior_std for p in ideal.fitted.problem.bench.parameters.free}
-    stds = {p.name: float(np.sqrt(loose * p.std**2 + ordinary.get(p.name, 0.0) ** 2)) for p in parameters}
-    return tuple(finding(t, values, stds, evidence) for t in found)
+    told = estimates(fitted.problem, fitted.evaluation).doubted(loose, ordinary)
+    return tuple(finding(t, told, evidence) for t in found)
