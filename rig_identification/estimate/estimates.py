@@ -69,7 +69,7 @@ def estimates(problem: Problem, evaluation: Evaluation, spread: Evaluation | Non
     """Every free parameter of a fit; spread: another fit of the same parameters that tells their errors."""
     parameters = problem.bench.parameters
     inverse = invert_information((spread or evaluation).information)
-    own = slice(INERTIAL, parameters.size)
+    own = slice(INERTIAL, INERTIAL + len(parameters.free))
     at = (spread or evaluation).point.theta[own]
     slopes = np.array([q.slope(x) for q, x in zip(parameters.free, at, strict=True)])
     values = parameters.values(evaluation.point.theta)
