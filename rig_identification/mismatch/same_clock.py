@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.estimates import parameter_estimates
+from rig_identification.estimate.estimates import estimates
 from rig_identification.mismatch.trial import Trial
 from rig_identification.recording import Recording
 
@@ -32,15 +32,13 @@ def contradicted(clock: Trial) -> bool:
     if clock.candidate.effect != "clock_offset":
         return False
     (own,) = clock.candidate.parameters
-    late = next(p for p in parameter_estimates(clock.problem, clock.evaluation) if p.name == own.name)
+    late, std = estimates(clock.problem, clock.evaluation).of(own.name)
     recordings = {id(run.recording): run.recording for run in clock.problem.runs}.values()
     intervals = [shared_interval(r, str(clock.candidate.where["channel"])) for r in recordings]
     known = [interval for interval in intervals if interval is not None]
     if len(known) < len(intervals):
         return False
-    return all(
-        abs(late.value - interval * round(late.value / interval)) > OFF * late.std for interval in known
-    )
+    return all(abs(late - interval * round(late / interval)) > OFF * std for interval in known)
 
 
 def shared_interval(recording: Recording, device: str) -> float | None:
