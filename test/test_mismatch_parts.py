@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -139,12 +140,14 @@ def test_a_response_is_whitened_as_the_residuals_are(
     nominal = linearise_run(problem.bench, run, theta, start, extra_noise=np.diag([2.0] * 3 + [1.0] * 3))
     assert nominal is not None
     wrenches = np.random.default_rng(2).normal(size=(run.grid.nodes, 6, 3))
-    deaf = replace(nominal, Q=np.zeros_like(nominal.Q), variance=np.ones_like(nominal.variance))
-    for smooth in (False, True):
+    silent = replace(nominal.noise, Q=np.zeros_like(nominal.noise.Q))
+    deaf = replace(nominal, noise=silent, variance=np.ones_like(nominal.variance))
+    for each, smooth in product((1, 4), (False, True)):
+        nominal = replace(nominal, noise=replace(nominal.noise, each=each))
         columns = np.column_stack([nominal.plain, whitened_response(deaf, wrenches, smooth=smooth)])
         A, B, _, _, _ = nominal.motion.derivatives
         at, H, D = nominal.nodes, nominal.row_H, nominal.row_D
-        whiten(A, B, nominal.Q, nominal.latent, at, H, D, nominal.variance, columns)
+        whiten(A, B, nominal.noise.Q, nominal.latent, at, H, D, nominal.variance, columns, each)
         assert whitened_response(nominal, wrenches, smooth=smooth) == pytest.approx(columns[:, 1:], abs=1e-9)
 
 
@@ -163,6 +166,6 @@ def test_a_wrench_moves_every_sample_as_running_the_model_again_does(
     # What the noise is taken to be moves with the latent wrench: compare before whitening
     plain = (nominal.plain - moved.plain) / np.sqrt(nominal.variance)
     assert np.max(np.abs(plain)) > 0.5
-    alone = replace(nominal, Q=np.zeros_like(nominal.Q))
+    alone = replace(nominal, noise=replace(nominal.noise, Q=np.zeros_like(nominal.noise.Q)))
     change = whitened_response(alone, wrench[:, :, None])[:, 0]
     assert np.max(np.abs(plain - change)) < 0.05 * np.max(np.abs(change))

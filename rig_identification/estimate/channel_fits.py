@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def node_corrections(linearised: Linearised) -> Array | None:
     """(N, 18 + n) correction of the raw outputs by the exciter's smoothed force error; None: no noise."""
     motion = linearised.motion
-    if not np.any(linearised.Q) or motion.H is None or motion.D is None:
+    if not np.any(linearised.noise.Q) or motion.H is None or motion.D is None:
         return None
     states, wrenches, _ = smoothed(linearised)
     return np.asarray(np.einsum("nij,nj->ni", motion.H, states) + np.einsum("nij,nj->ni", motion.D, wrenches))

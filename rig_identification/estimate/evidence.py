@@ -21,6 +21,7 @@ from rig_identification.estimate.sampling import (
     noise_felt,
     worst_cubic_error,
 )
+from rig_identification.estimate.smooth_force import smooth_force
 from rig_identification.recording import Recording, Series
 from rig_identification.rig import Rig
 
@@ -295,11 +296,15 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
         noise = float(np.sqrt(np.mean(std**2)))
         rate = 1.0 / float(np.median(np.diff(exciter.time)))
         known = bridged(grid, exciter.time, exciter.values, noise)
-        force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
         unknown = known.unknown
+        force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
+        if not (unknown or np.any(force.doubt) or np.any(force.jumps)):
+            force = smooth_force(grid, exciter.time, exciter.values, std) or force
     channels = tuple(c for c in found if c is not None)
     run = Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
     if force is None:
+        return run
+    if force.held > 1:
         return run
     felt = noise_felt(grid, known.time, run.samplers)
     return replace(run, channels=tuple(replace(c, felt=f) for c, f in zip(channels, felt, strict=True)))

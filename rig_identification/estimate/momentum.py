@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.force_noise import exciter_wrench_map
 from rig_identification.estimate.parameters import ParameterSet
-from rig_identification.estimate.prediction import drive, exciter_wrench_map
+from rig_identification.estimate.prediction import drive
 from rig_identification.estimate.sampling import node_values
 from rig_identification.estimate.track import Track
 from rig_identification.model import layout

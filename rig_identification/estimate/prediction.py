@@ -11,9 +11,9 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.force_noise import RandomWrench, random_wrench
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import ParameterSet
-from rig_identification.estimate.sampling import rate_noise
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors
@@ -125,8 +125,7 @@ class Linearised:
     variance: Array  # (m,) sensor noise of each row
     row_H: Array  # (m, 12 + 2 s) response of each row to the state at its node
     row_D: Array  # (m, 6) ... and to the wrench
-    felt: Array  # (m, 6) ... and to the wrench that noise stands for
-    Q: Array  # (N, 6, 6) covariance of the wrench that noise stands for
+    noise: RandomWrench  # what noise drives the model with
     latent: Array  # (N, 6) wrench noise that the nominal motion holds
     readings: dict[str, sensors.Reading]  # each device at the nodes
 
@@ -138,40 +137,15 @@ class Linearised:
     @cached_property
     def filter(self) -> tuple[Array, Array]:
         """How wrenches to come are whitened: gains and standard deviations (whitening.filter_of)."""
-        if not np.any(self.Q):
+        noise = self.noise
+        if not np.any(noise.Q):
             # Nothing moves the body but what is known: no sample tells anything of the next one
             return np.zeros((self.nodes.size, self.row_H.shape[1] + 6)), np.sqrt(self.variance)
-        A, B, _, _, _ = self.motion.derivatives
-        gains, deviations = filter_of(A, B, self.Q, self.nodes, self.row_H, self.felt, self.variance)
+        A = self.motion.derivatives[0]
+        gains, deviations = filter_of(
+            A, noise.through, noise.Q, self.nodes, self.row_H, noise.felt, self.variance, noise.each
+        )
         return np.asarray(gains), np.asarray(deviations)
-
-
-def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:
-    """(6, 3): wrench about the datum, body axes, of a force in the exciter frame."""
-    physics = parameters.physics(theta)
-    position = physics[layout.EXCITER_POSITION : layout.EXCITER_POSITION + 3]
-    turn = Rotation.from_rotvec(physics[layout.EXCITER_ROTATION : layout.EXCITER_ROTATION + 3]).as_matrix()
-    force = turn @ parameters.model.exciter_orientation
-    return np.concatenate([force, np.cross(position, force.T).T])
-
-
-def force_noise(run: Run, parameters: ParameterSet, theta: Array) -> Array:
-    """(N, 6, 6) covariance of the wrench held over each node interval that the force's error stands for.
-
-    Three errors: the samples' noise, the moment of a jump, which lies anywhere between two nodes, and what
-    the force did where it was not sampled. Where a low-pass is undone the noise of the force's rate is added.
-    """
-    out = np.zeros((run.grid.nodes, 6, 6))
-    if run.force is None or (run.exciter_noise == 0.0 and not np.any(run.force.doubt)):
-        return out
-    spread = exciter_wrench_map(parameters, theta)
-    tau = parameters.device(theta)[parameters.places.lag("exciter")]
-    step = run.grid.step
-    held = run.exciter_noise**2 / (run.exciter_rate * step) * (1.0 + tau**2 * rate_noise(step))
-    out[:] = (held + run.force.doubt)[:, None, None] * (spread @ spread.T)
-    jumps = spread @ run.force.jumps[:, :, None]
-    # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12
-    return np.asarray(out + jumps @ jumps.transpose(0, 2, 1) / 12.0)
 
 
 def _in_use(in_raw: Array) -> NDArray[np.int64]:
@@ -324,15 +298,14 @@ def linearise_run(
         H[here], D[here] = in_state.reshape(spread.size, -1), in_wrench.reshape(spread.size, 6)
         columns[here] = rows.reshape(spread.size, -1)
     plain = columns[:, 0].copy()
-    Q = force_noise(run, parameters, theta)
-    felt = D
-    if extra_noise is None and latent is None:
-        # What only noise stands for reaches a sample by way of nodes; a wrench that really acts, as it is
-        felt = np.array([c.felt for c in run.channels])[which, None] * D if run.channels else D
-    if extra_noise is not None:
-        Q = Q + extra_noise
-    if np.any(Q):
-        log_spread = float(whiten(motion.A, motion.B, Q, held, at, H, felt, variance, columns))
+    A, B, _, _, _ = motion.derivatives
+    acts = extra_noise is not None or latent is not None
+    felt = None if acts or not run.channels else np.array([c.felt for c in run.channels])[which]
+    noise = random_wrench(run, parameters, theta, B, D, at, felt, extra_noise)
+    if np.any(noise.Q):
+        log_spread = float(
+            whiten(A, noise.through, noise.Q, held, at, H, noise.felt, variance, columns, noise.each)
+        )
     else:
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
@@ -353,8 +326,7 @@ def linearise_run(
         variance,
         H,
         D,
-        felt,
-        Q,
+        noise,
         held,
         readings,
     )
@@ -366,16 +338,18 @@ def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array,
     start (X, X), X = 12 + 2 s: covariance of the start state (none: it is exact). Returns (N, X)
     state and (N, 6) wrench corrections and (N, X, X) covariance of the filtered state.
     """
-    motion = linearised.motion
-    return smooth(  # type: ignore[no-any-return]
+    motion, noise = linearised.motion, linearised.noise
+    states, drawn, spread = smooth(
         motion.A,
-        motion.B,
-        linearised.Q,
+        noise.through,
+        noise.Q,
         linearised.latent,
         linearised.nodes,
         linearised.row_H,
-        linearised.felt,
+        noise.felt,
         linearised.variance,
         linearised.plain,
         np.zeros((motion.states.shape[1],) * 2) if start is None else start,
+        noise.each,
     )
+    return states, np.einsum("nij,nj->ni", noise.wrench, drawn), spread

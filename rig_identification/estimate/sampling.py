@@ -194,6 +194,8 @@ class NodeInput:
     smooth: SmoothInput
     jumps: Array  # (nodes, w) see jumps_of
     doubt: Array  # (nodes,) variance of each component over an interval that was not sampled
+    held: int  # nodes from draw to draw of its noise: 1, another one in each interval (force_noise.py)
+    rate_noise: float  # 1/s2, variance of its rate in that of a draw
 
     def between(self, first: int, last: int) -> NodeInput:
         """The input at nodes ``first`` to ``last``."""
@@ -204,6 +206,8 @@ class NodeInput:
             replace(self.smooth, first=self.smooth.first + first, nodes=last + 1 - first),
             self.jumps[cut],
             self.doubt[cut],
+            self.held,
+            self.rate_noise,
         )
 
     def late_by(self, late: float) -> tuple[Array, Array, Array, Array]:
@@ -233,7 +237,9 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     jumps = jumps_of(line, noise)
     smooth = smoothed_input(grid, line)
     if grid.nodes < 5:
-        return NodeInput(line, np.zeros_like(line), smooth, jumps, np.zeros(grid.nodes))
+        return NodeInput(
+            line, np.zeros_like(line), smooth, jumps, np.zeros(grid.nodes), 1, rate_noise(grid.step)
+        )
     rough = np.any(jumps != 0.0, axis=1)[:, None]
     rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
     curved = np.zeros_like(line)
@@ -245,7 +251,8 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     values = np.where(rough, line, line - over * curved)
     middle = np.zeros_like(line)
     middle[1:-2] = (values[1:-2] + values[2:-1] - values[:-3] - values[3:]) / 16.0
-    return NodeInput(values, np.where(rough, 0.0, middle), smooth, jumps, np.zeros(grid.nodes))
+    middle = np.where(rough, 0.0, middle)
+    return NodeInput(values, middle, smooth, jumps, np.zeros(grid.nodes), 1, rate_noise(grid.step))
 
 
 #: s, of the Gaussian that takes an input's noise off before it is differentiated, or moved in time.

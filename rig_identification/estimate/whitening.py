@@ -6,6 +6,10 @@ standard deviation, are white under the model (Kailath, IEEE TAC 13, 1968); what
 to the residual it does to every column of the Jacobian, and least squares on the result
 is generalised least squares with the exact covariance of force and sensor noise. The sum
 of log standard deviations is what the marginal likelihood needs beside it.
+
+Noise that is not white has w_k a mean of two draws of three numbers, w_k = (u_j, u_{j+1}) over ``each``
+nodes, of which the second becomes the first when the next one is drawn (force_noise.py). ``each`` 1: all
+six numbers are drawn anew at every node.
 """
 
 from __future__ import annotations
@@ -15,27 +19,56 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def _new_wrench(P, Q):  # type: ignore[no-untyped-def]
-    """Write a new interval's wrench, of covariance ``Q`` (6, 6), into ``P``: nothing is known of it yet."""
+def _drawn(P, Q, k, each):  # type: ignore[no-untyped-def]
+    """Write what node ``k`` draws, of covariance ``Q`` (6, 6), into ``P``: nothing is known of it yet."""
     states = P.shape[0] - 6
-    for i in range(6):
-        for j in range(6):
-            P[states + i, states + j] = Q[i, j]
-        for j in range(states):
-            P[states + i, j] = 0.0
-            P[j, states + i] = 0.0
+    new = states
+    if each > 1 and k > 0:
+        if k % each != 0:
+            return
+        # What was the second draw is the first one now
+        new = states + 3
+        for i in range(3):
+            for j in range(states):
+                P[states + i, j] = P[new + i, j]
+                P[j, states + i] = P[new + i, j]
+        for i in range(3):
+            for j in range(3):
+                P[states + i, states + j] = P[new + i, new + j]
+    for i in range(new, states + 6):
+        for j in range(new):
+            P[i, j] = 0.0
+            P[j, i] = 0.0
+        for j in range(new, states + 6):
+            P[i, j] = Q[i - states, j - states]
 
 
 @njit(cache=True, nogil=True)
-def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-untyped-def]
+def _moved_on(P, F, each):  # type: ignore[no-untyped-def]
+    """Carry ``P`` to the next node by ``F`` (X, X + 6), its state alone where all draws are over."""
+    states = F.shape[0]
+    after = np.dot(F, P)
+    P[:states, :states] = np.dot(after, F.T)
+    for i in range(states):
+        for j in range(i):
+            mean = 0.5 * (P[i, j] + P[j, i])
+            P[i, j] = mean
+            P[j, i] = mean
+        if each > 1:
+            for j in range(states, states + 6):
+                P[i, j] = after[i, j]
+                P[j, i] = after[i, j]
+
+
+@njit(cache=True, nogil=True)
+def whiten(A, B, Q, latent, node, H, D, variance, columns, each=1):  # type: ignore[no-untyped-def]
     """Replace ``columns`` (m, c) by their normalised innovations; returns the sum of log standard deviations.
 
     node (m,): ascending node index of each row. H (m, X), D (m, 6): response of the row to
     state (X = 12 and twice the internal coordinates) and wrench. variance (m,): sensor noise of
-    the row. Q (N, 6, 6): covariance of the wrench over each interval. latent (N, 6):
-    wrench that the nominal motion already holds of
-    this noise, whose mean is zero all the same. Column 0 is measured less predicted, the others derivatives
-    of the prediction.
+    the row. Q (N, 6, 6): covariance of the wrench over each interval. latent (N, 6): wrench that the nominal
+    motion already holds of this noise, whose mean is zero all the same. Column 0 is measured less predicted,
+    the others derivatives of the prediction. each: nodes from draw to draw, 1 where ``latent`` is not zero.
     """
     rows, count = columns.shape
     states = A.shape[1]
@@ -47,14 +80,14 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
     log_sum = 0.0
     row = 0
     x_next = np.empty((states, count))
-    P_next = np.empty((states, states))
     F = np.empty((states, size))
     for k in range(A.shape[0]):
-        _new_wrench(P, Q[k])
-        for i in range(6):
-            for c in range(count):
-                X[states + i, c] = 0.0
-            X[states + i, 0] = -latent[k, i]
+        _drawn(P, Q[k], k, each)
+        if k % each == 0:
+            for i in range(6):
+                for c in range(count):
+                    X[states + i, c] = X[states + i + 3, c] if each > 1 and i < 3 else 0.0
+                X[states + i, 0] -= latent[k, i]
         while row < rows and node[row] == k:
             for i in range(states):
                 h[i] = H[row, i]
@@ -89,17 +122,15 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns):  # type: ignore[no-u
         F[:, :states] = A[k]
         F[:, states:] = B[k]
         x_next[:, :] = np.dot(F, X)
-        P_next[:, :] = np.dot(np.dot(F, P), F.T)
         for i in range(states):
             for c in range(count):
                 X[i, c] = x_next[i, c]
-            for j in range(states):
-                P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
+        _moved_on(P, F, each)
     return log_sum
 
 
 @njit(cache=True, nogil=True)
-def filter_of(A, B, Q, node, H, D, variance):  # type: ignore[no-untyped-def]
+def filter_of(A, B, Q, node, H, D, variance, each=1):  # type: ignore[no-untyped-def]
     """The filter of :func:`whiten` for columns to come.
 
     Returns (m, X + 6) what an innovation of one standard deviation moves state and wrench by, and (m,) the
@@ -112,7 +143,7 @@ def filter_of(A, B, Q, node, H, D, variance):  # type: ignore[no-untyped-def]
     h, gain, F = np.empty(size), np.empty(size), np.empty((states, size))
     row = 0
     for k in range(A.shape[0]):
-        _new_wrench(P, Q[k])
+        _drawn(P, Q[k], k, each)
         while row < node.shape[0] and node[row] == k:
             h[:states] = H[row]
             h[states:] = D[row]
@@ -126,13 +157,12 @@ def filter_of(A, B, Q, node, H, D, variance):  # type: ignore[no-untyped-def]
             row += 1
         F[:, :states] = A[k]
         F[:, states:] = B[k]
-        after = np.dot(np.dot(F, P), F.T)
-        P[:states, :states] = 0.5 * (after + after.T)
+        _moved_on(P, F, each)
     return gains, deviations
 
 
 @njit(cache=True, nogil=True)
-def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ignore[no-untyped-def]
+def smooth(A, B, Q, latent, node, H, D, variance, residual, start, each=1):  # type: ignore[no-untyped-def]
     """Best correction of the nominal motion by noise that enters as force, given the whole run.
 
     Arguments as in :func:`whiten`; residual (m,) measured less predicted; start (X, X)
@@ -157,9 +187,10 @@ def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ign
     F = np.empty((order, size))
     row = 0
     for k in range(nodes):
-        _new_wrench(P, Q[k])
-        for i in range(6):
-            x[order + i] = -latent[k, i]
+        _drawn(P, Q[k], k, each)
+        if k % each == 0:
+            for i in range(6):
+                x[order + i] = (x[order + i + 3] if each > 1 and i < 3 else 0.0) - latent[k, i]
         means[k] = x
         spreads[k] = P
         while row < rows and node[row] == k:
@@ -178,12 +209,8 @@ def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ign
         filtered[k] = P[:order, :order]
         F[:, :order] = A[k]
         F[:, order:] = B[k]
-        x_next = np.dot(F, x)
-        P_next = np.dot(np.dot(F, P), F.T)
-        x[:order] = x_next
-        for i in range(order):
-            for j in range(order):
-                P[i, j] = 0.5 * (P_next[i, j] + P_next[j, i])
+        x[:order] = np.dot(F, x)
+        _moved_on(P, F, each)
     states = np.zeros((nodes, order))
     wrenches = np.zeros((nodes, 6))
     adjoint = np.zeros(size)
@@ -192,7 +219,13 @@ def smooth(A, B, Q, latent, node, H, D, variance, residual, start):  # type: ign
         if k < nodes - 1:
             F[:, :order] = A[k]
             F[:, order:] = B[k]
-            adjoint = np.dot(F.T, np.ascontiguousarray(adjoint[:order]))
+            ahead = adjoint
+            adjoint = np.dot(F.T, np.ascontiguousarray(ahead[:order]))
+            # What later samples say of a draw that goes on
+            if (k + 1) % each != 0:
+                adjoint[order:] += ahead[order:]
+            elif each > 1:
+                adjoint[order + 3 :] += ahead[order : order + 3]
         while row >= 0 and node[row] == k:
             h[:order] = H[row]
             h[order:] = D[row]

@@ -50,8 +50,12 @@ def silenced(problem: Problem, device: str) -> Problem:
         channels = tuple(
             replace(c, noise=SILENT * c.noise) if c.device == device else c for c in run.channels
         )
-        loud = SILENT if device == DRIVE else 1.0
-        runs.append(replace(run, channels=channels, exciter_noise=loud * run.exciter_noise))
+        silent = replace(run, channels=channels)
+        if device == DRIVE and run.force is not None:
+            # A force of which nothing is known is another one in each interval
+            unheld = replace(run.force, held=1)
+            silent = replace(silent, force=unheld, exciter_noise=SILENT * run.exciter_noise)
+        runs.append(silent)
     rests = tuple(
         replace(
             rest,

@@ -4,7 +4,7 @@ Between nodes x_{k+1} = A_k x_k + B_k w_k, w_k being the interval's mean, and a 
 H x_k + D w_k: whatever acts as a wrench can be screened by one pass of this recursion, without running the
 model again. What the run's filter (estimate/whitening.py) has seen of it, state and wrench, is taken away as
 it goes: only what is unseen yet is carried on, and what a sample sees of that is its normalised innovation.
-Its own noise reaches a sample by way of nodes on both sides (estimate/sampling.py), and less of it.
+Its own noise reaches state and sample in its own way (estimate/force_noise.py).
 """
 
 from __future__ import annotations
@@ -19,20 +19,26 @@ Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def _innovations(A, B, node, H, D, felt, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
+def _innovations(A, B, node, H, D, through, felt, each, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
     """out (m, c): normalised innovations of the responses to ``wrenches`` (N, 6, c).
 
-    felt (m, 6): response of each row to the filter's own noise. gains (m, X + 6), deviations (m,): its own.
+    through (N, X, 6), felt (m, 6), each: the filter's own noise, how it reaches the next state and each row,
+    and nodes from draw to draw (estimate/whitening.py). gains (m, X + 6), deviations (m,): the filter.
     """
     nodes, states, count = A.shape[0], A.shape[1], wrenches.shape[2]
-    size = states + 6
+    size = states + 12
     unseen, after = np.zeros((size, count)), np.empty((states, count))
-    taken = np.empty((6, count))  # what the filter takes for its own noise of this interval
+    taken = np.zeros((6, count))  # what the filter takes for its own noise
     seen = np.empty(count)
     F = np.empty((states, size))
     row = 0
     for k in range(nodes):
-        taken[:] = 0.0
+        if k % each == 0:
+            if each > 1:
+                taken[:3] = taken[3:]
+                taken[3:] = 0.0
+            else:
+                taken[:] = 0.0
         while row < node.shape[0] and node[row] == k:
             seen[:] = 0.0
             for i in range(states):
@@ -58,10 +64,11 @@ def _innovations(A, B, node, H, D, felt, gains, deviations, wrenches, smooth, ou
         ahead = min(k + 1, nodes - 1) if smooth else k
         for i in range(6):
             for c in range(count):
-                held = 0.5 * (wrenches[k, i, c] + wrenches[ahead, i, c])
-                unseen[states + i, c] = held - taken[i, c]
+                unseen[states + i, c] = 0.5 * (wrenches[k, i, c] + wrenches[ahead, i, c])
+                unseen[states + 6 + i, c] = -taken[i, c]
         F[:, :states] = A[k]
-        F[:, states:] = B[k]
+        F[:, states : states + 6] = B[k]
+        F[:, states + 6 :] = through[k]
         after[:, :] = np.dot(F, unseen)
         unseen[:states] = after
 
@@ -75,7 +82,9 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     A, B, _, _, _ = run.motion.derivatives
     out = np.empty((run.nodes.size, wrenches.shape[2]))
     held = np.ascontiguousarray(wrenches)
-    _innovations(A, B, run.nodes, run.row_H, run.row_D, run.felt, *run.filter, held, smooth, out)
+    noise = run.noise
+    filtered = (noise.through, noise.felt, noise.each, *run.filter)
+    _innovations(A, B, run.nodes, run.row_H, run.row_D, *filtered, held, smooth, out)
     return out
 
 

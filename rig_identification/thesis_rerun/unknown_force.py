@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.prediction import exciter_wrench_map, smoothed
+from rig_identification.estimate.force_noise import exciter_wrench_map
+from rig_identification.estimate.prediction import smoothed
 from rig_identification.estimate.sampling import Grid, group_by_node
 from rig_identification.estimate.solve import Point, solve
 from rig_identification.live.generalized_wrench import generalized_wrench
