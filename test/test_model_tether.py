@@ -125,5 +125,6 @@ def test_a_hose_that_comes_slack_is_told_with_its_own_stiffness_and_pull() -> No
     told = ended.candidate.told(estimates(ended.problem, ended.evaluation))
     value, std, _ = told["stiffness"]
     assert abs(value - stiffness) < 4.0 * std
-    assert told["preload"][0] == pytest.approx(pull, rel=0.2)
+    value, std, _ = told["preload"]
+    assert abs(value - pull) < 3.0 * std < 1.5 * pull
     assert values["tether.reach.x"] > 0.0

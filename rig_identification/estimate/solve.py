@@ -407,7 +407,7 @@ def solve(
                 return current, not on_plateau(current)
             if damping > 1e-3 and gain < polish * excess(current):
                 # Held back so much, no step can win what would be worth it
-                return current, False
+                return current, _as_good_as_settled(problem, current)
             moved, allowed = _moved(problem, current, change), current.cost + ROUNDING * abs(current.cost)
             if damping <= 1e-3 and gain < AT_ROOT and against < LEAPS:
                 allowed += gain
