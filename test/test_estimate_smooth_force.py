@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import welch
 
+from rig_identification.estimate.band_limited import shaping
 from rig_identification.estimate.sampling import Grid, NodeInput
 from rig_identification.estimate.smooth_force import smooth_force
 
@@ -39,9 +41,9 @@ def test_a_motor_s_force_is_kept_and_most_of_its_noise_is_not(step: float, frequ
     true = turning(at, frequency)
     smooth = found(step, turning(TIME, frequency))
     assert smooth is not None
-    assert smooth.held > 1
+    assert smooth.cutoff > 0.0
     # As a mean over half a cycle of the highest frequency that is kept averages the samples' noise
-    expected = float(NOISE[0]) * np.sqrt(0.002 / (smooth.held * step))
+    expected = float(NOISE[0]) * np.sqrt(2.0 * smooth.cutoff * 0.002)
     error = (smooth.values - true)[:, 0]
     assert np.std(error) == pytest.approx(expected, rel=0.25)
     middle = turning(at + 0.5 * step, frequency)[:-1] - 0.5 * (true[1:] + true[:-1])
@@ -52,9 +54,9 @@ def test_a_motor_s_force_is_kept_and_most_of_its_noise_is_not(step: float, frequ
 
 
 def test_what_is_claimed_of_the_noise_is_what_noise_does() -> None:
-    """Its power over a long time, of the force and of its rate."""
+    """Its power over a long time and up to where the spline ends, of the force, and that of its rate."""
     step = 0.01
-    rates, slow = [], []
+    rates, slow, power = [], [], []
     for seed in range(40):
         smooth = found(step, np.zeros((TIME.size, 1)), seed)
         assert smooth is not None
@@ -62,9 +64,25 @@ def test_what_is_claimed_of_the_noise_is_what_noise_does() -> None:
         rates.append(np.var(smooth.late_by(0.0)[2][100:-100, 0]))
         # Means of half a second
         slow.append(np.mean(inside[: 50 * (inside.size // 50)].reshape(-1, 50).mean(axis=1) ** 2))
-    of_draw = float(NOISE[0]) ** 2 * 0.002 / (smooth.held * step)
-    assert np.mean(rates) == pytest.approx(smooth.rate_noise * of_draw, rel=0.25)
-    assert np.mean(slow) == pytest.approx(of_draw * smooth.held * step / 0.5, rel=0.1)
+        frequency, density = welch(inside, 1.0 / step, nperseg=512)
+        power.append(density)
+    below = float(NOISE[0]) ** 2 * 2.0 * smooth.cutoff * 0.002
+    assert np.mean(rates) == pytest.approx(smooth.rate_noise * below, rel=0.25)
+    assert np.mean(slow) == pytest.approx(float(NOISE[0]) ** 2 * 0.002 / 0.5, rel=0.1)
+    # What is claimed: white noise of nodes with the same power, band by band
+    follow, reads = shaping(smooth.cutoff, step)
+    rng = np.random.default_rng(3)
+    new = np.linalg.cholesky(np.eye(len(reads)) - follow @ follow.T)
+    state, made = rng.normal(size=len(reads)), np.empty(40 * smooth.values.shape[0])
+    for k in range(made.size):
+        made[k] = reads @ state
+        state = follow @ state + new @ rng.normal(size=len(reads))
+    made *= float(NOISE[0]) * np.sqrt(0.002 / step)
+    claimed, kept = welch(made, 1.0 / step, nperseg=512)[1], np.mean(power, axis=0)
+    for low, high in ((0.1, 0.5), (0.5, 0.75), (0.75, 1.0), (1.0, 1.2)):
+        band = (frequency > low * smooth.cutoff) & (frequency < high * smooth.cutoff)
+        assert np.sum(claimed[band]) == pytest.approx(np.sum(kept[band]), rel=0.15)
+    assert np.sum(claimed[frequency > 1.6 * smooth.cutoff]) < 2e-3 * np.sum(claimed)
 
 
 def test_a_higher_harmonic_is_kept() -> None:

@@ -13,6 +13,7 @@ from test_model_internal import with_rest
 from test_model_rigs import thesis_case_14
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.force_noise import WHITE
 from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.whitening import whiten
@@ -142,12 +143,13 @@ def test_a_response_is_whitened_as_the_residuals_are(
     wrenches = np.random.default_rng(2).normal(size=(run.grid.nodes, 6, 3))
     silent = replace(nominal.noise, Q=np.zeros_like(nominal.noise.Q))
     deaf = replace(nominal, noise=silent, variance=np.ones_like(nominal.variance))
-    for each, smooth in product((1, 4), (False, True)):
-        nominal = replace(nominal, noise=replace(nominal.noise, each=each))
+    steady = np.array([[0.9, 0.1], [-0.2, 0.8]])
+    for follow, smooth in product((WHITE, steady), (False, True)):
+        nominal = replace(nominal, noise=replace(nominal.noise, follow=follow))
         columns = np.column_stack([nominal.plain, whitened_response(deaf, wrenches, smooth=smooth)])
         A, B, _, _, _ = nominal.motion.derivatives
         at, H, D = nominal.nodes, nominal.row_H, nominal.row_D
-        whiten(A, B, nominal.noise.Q, nominal.latent, at, H, D, nominal.variance, columns, each)
+        whiten(A, B, nominal.noise.Q, nominal.latent, at, H, D, nominal.variance, columns, follow)
         assert whitened_response(nominal, wrenches, smooth=smooth) == pytest.approx(columns[:, 1:], abs=1e-9)
 
 

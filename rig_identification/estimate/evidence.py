@@ -304,7 +304,7 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
     run = Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
     if force is None:
         return run
-    if force.held > 1:
+    if force.cutoff > 0.0:
         return run
     felt = noise_felt(grid, known.time, run.samplers)
     return replace(run, channels=tuple(replace(c, felt=f) for c, f in zip(channels, felt, strict=True)))

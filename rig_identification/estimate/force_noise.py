@@ -2,10 +2,7 @@
 
 A force that is a line from node to node (sampling.py) errs anew in every interval: six numbers w_k, the
 wrench held over it. One that is smooth (smooth_force.py) errs by what is smooth as well, white up to some
-frequency c. Here that is a line from draw to draw of three numbers u_j, the force's components, 1/(2 c)
-apart, whose power at f is that of white noise times sinc(f / 2c)^4: two thirds at half of c, a sixth
-at c, and a thousandth from twice c on, where a ceiling that rings at fifty times the power of all else would
-answer to hundredths of it.
+frequency c (band_limited.py).
 """
 
 from __future__ import annotations
@@ -16,22 +13,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.estimate.band_limited import POLES, shaping
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.model import layout
 
 Array = NDArray[np.float64]
 
+#: No row: noise of a node that has no part in the next one's.
+WHITE = np.zeros((0, 0))
+
 
 @dataclass(frozen=True)
 class RandomWrench:
-    """Six numbers a node that are noise, and what they do; whitening.py has how they are drawn."""
+    """Numbers at each node that are noise, and what they do; whitening.py has how they are drawn.
 
-    Q: Array  # (N, 6, 6) covariance of what each node draws
-    each: int  # nodes from draw to draw
-    through: Array  # (N, X, 6) response of the next node's state
-    felt: Array  # (m, 6) response of each row
-    wrench: Array  # (N, 6, 6) response of the wrench at each node
+    w of them: a wrench that is another one at each node, or the state of what filters the force's noise.
+    """
+
+    Q: Array  # (N or fewer, w, w) covariance of what each node draws, the last one also after it
+    follow: Array  # (f, f) how each component of a force goes on; of no rows: all is drawn anew
+    through: Array  # (N, X, w) response of the next node's state
+    felt: Array  # (m, w) response of each row
+    wrench: Array  # (6, w) response of the wrench at a node
 
 
 def exciter_wrench_map(parameters: ParameterSet, theta: Array) -> Array:
@@ -60,42 +64,35 @@ def random_wrench(
     where a wrench that really acts is among it, which reaches every row as it is. extra (6, 6): covariance of
     such a one over each interval.
     """
-    if felt is None or run.force is None or run.force.held == 1:
+    if felt is None or run.force is None or run.force.cutoff == 0.0:
         Q = _of_intervals(run, parameters, theta)
-        each = np.tile(np.eye(6), (run.grid.nodes, 1, 1))
         at_once = D if felt is None else felt[:, None] * D
-        return RandomWrench(Q if extra is None else Q + extra, 1, B, at_once, each)
-    held = run.force.held
+        return RandomWrench(Q if extra is None else Q + extra, WHITE, B, at_once, np.eye(6))
     spread = exciter_wrench_map(parameters, theta)
-    along = (np.arange(run.grid.nodes) % held) / held
-    between = along + 0.5 / held
-    through = B @ spread
-    rows, at = D @ spread, along[node, None]
-    ways = np.tile(spread, (run.grid.nodes, 1, 1))
+    follow, reads = shaping(run.force.cutoff, run.grid.step)
+    begun = _variance(run, parameters, theta) * np.eye(3 * POLES)
+    carried = np.kron(follow, np.eye(3))
+    # Midway to the next node all but what is drawn there is known
+    midway = 0.5 * (reads + reads @ follow)
     return RandomWrench(
-        np.tile(_variance(run, parameters, theta, held) * np.eye(6), (run.grid.nodes, 1, 1)),
-        held,
-        _two(through, between[:, None, None]),
-        _two(rows, at),
-        _two(ways, along[:, None, None]),
+        np.stack([begun, begun - carried @ begun @ carried.T]),
+        follow,
+        np.ascontiguousarray(B @ np.kron(midway, spread)),
+        np.ascontiguousarray(D @ np.kron(reads, spread)),
+        np.asarray(np.kron(reads, spread)),
     )
 
 
-def _two(ways: Array, along: Array) -> Array:
-    """Responses (..., 3) to one draw as (..., 6) to the mean of two, ``along`` the way to the second one."""
-    return np.ascontiguousarray(np.concatenate([(1.0 - along) * ways, along * ways], axis=-1))
-
-
-def _variance(run: Run, parameters: ParameterSet, theta: Array, held: int) -> float:
-    """Variance (N2) of each component that the samples' noise has over ``held`` nodes.
+def _variance(run: Run, parameters: ParameterSet, theta: Array) -> float:
+    """Variance (N2) of each component that the samples' noise has over an interval.
 
     Where a low-pass is undone the noise of the force's rate is added.
     """
     if run.force is None:
         return 0.0
     tau = parameters.device(theta)[parameters.places.lag("exciter")]
-    apart = held * run.grid.step
-    return float(run.exciter_noise**2 / (run.exciter_rate * apart) * (1.0 + tau**2 * run.force.rate_noise))
+    mean = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
+    return float(mean * (1.0 + tau**2 * run.force.rate_noise))
 
 
 def _of_intervals(run: Run, parameters: ParameterSet, theta: Array) -> Array:
@@ -108,7 +105,7 @@ def _of_intervals(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     if run.force is None or (run.exciter_noise == 0.0 and not np.any(run.force.doubt)):
         return out
     spread = exciter_wrench_map(parameters, theta)
-    noise = _variance(run, parameters, theta, 1)
+    noise = _variance(run, parameters, theta)
     out[:] = (noise + run.force.doubt)[:, None, None] * (spread @ spread.T)
     jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12

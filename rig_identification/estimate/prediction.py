@@ -140,10 +140,11 @@ class Linearised:
         noise = self.noise
         if not np.any(noise.Q):
             # Nothing moves the body but what is known: no sample tells anything of the next one
-            return np.zeros((self.nodes.size, self.row_H.shape[1] + 6)), np.sqrt(self.variance)
+            states, own = self.row_H.shape[1], noise.felt.shape[1]
+            return np.zeros((self.nodes.size, states + own)), np.sqrt(self.variance)
         A = self.motion.derivatives[0]
         gains, deviations = filter_of(
-            A, noise.through, noise.Q, self.nodes, self.row_H, noise.felt, self.variance, noise.each
+            A, noise.through, noise.Q, self.nodes, self.row_H, noise.felt, self.variance, noise.follow
         )
         return np.asarray(gains), np.asarray(deviations)
 
@@ -304,7 +305,7 @@ def linearise_run(
     noise = random_wrench(run, parameters, theta, B, D, at, felt, extra_noise)
     if np.any(noise.Q):
         log_spread = float(
-            whiten(A, noise.through, noise.Q, held, at, H, noise.felt, variance, columns, noise.each)
+            whiten(A, noise.through, noise.Q, held, at, H, noise.felt, variance, columns, noise.follow)
         )
     else:
         deviation = np.sqrt(variance)
@@ -350,6 +351,6 @@ def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array,
         linearised.variance,
         linearised.plain,
         np.zeros((motion.states.shape[1],) * 2) if start is None else start,
-        noise.each,
+        noise.follow,
     )
-    return states, np.einsum("nij,nj->ni", noise.wrench, drawn), spread
+    return states, drawn @ noise.wrench.T, spread

@@ -194,8 +194,8 @@ class NodeInput:
     smooth: SmoothInput
     jumps: Array  # (nodes, w) see jumps_of
     doubt: Array  # (nodes,) variance of each component over an interval that was not sampled
-    held: int  # nodes from draw to draw of its noise: 1, another one in each interval (force_noise.py)
-    rate_noise: float  # 1/s2, variance of its rate in that of a draw
+    cutoff: float  # Hz up to which its noise is white; 0: it is another one in each interval (force_noise.py)
+    rate_noise: float  # 1/s2, variance of its rate in that of its noise
 
     def between(self, first: int, last: int) -> NodeInput:
         """The input at nodes ``first`` to ``last``."""
@@ -206,7 +206,7 @@ class NodeInput:
             replace(self.smooth, first=self.smooth.first + first, nodes=last + 1 - first),
             self.jumps[cut],
             self.doubt[cut],
-            self.held,
+            self.cutoff,
             self.rate_noise,
         )
 
@@ -238,7 +238,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     smooth = smoothed_input(grid, line)
     if grid.nodes < 5:
         return NodeInput(
-            line, np.zeros_like(line), smooth, jumps, np.zeros(grid.nodes), 1, rate_noise(grid.step)
+            line, np.zeros_like(line), smooth, jumps, np.zeros(grid.nodes), 0.0, rate_noise(grid.step)
         )
     rough = np.any(jumps != 0.0, axis=1)[:, None]
     rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
@@ -252,7 +252,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     middle = np.zeros_like(line)
     middle[1:-2] = (values[1:-2] + values[2:-1] - values[:-3] - values[3:]) / 16.0
     middle = np.where(rough, 0.0, middle)
-    return NodeInput(values, middle, smooth, jumps, np.zeros(grid.nodes), 1, rate_noise(grid.step))
+    return NodeInput(values, middle, smooth, jumps, np.zeros(grid.nodes), 0.0, rate_noise(grid.step))
 
 
 #: s, of the Gaussian that takes an input's noise off before it is differentiated, or moved in time.

@@ -13,7 +13,7 @@ A force without jumps and gaps is therefore a penalised cubic spline (P-spline: 
 Science 11, 1996) with fourth differences, of which a frequency f keeps 1/(1 + (f/c)^8): 1e-5 is lost at a
 quarter of c, and a thousandth of the noise's power is left at one and a half times c. c is the lowest at
 which the samples' noise is all that the spline leaves. The noise that it keeps is white up to about c
-(force_noise.py).
+(band_limited.py).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from scipy.signal.windows import hann
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from rig_identification.estimate.band_limited import highest_cutoff
 from rig_identification.estimate.sampling import Grid, NodeInput, SmoothInput, sample_noise_std
 
 Array = NDArray[np.float64]
@@ -58,7 +59,7 @@ def smooth_force(grid: Grid, time: Array, values: Array, noise: Array) -> NodeIn
     if not np.all(noise > 0.0):
         return None
     splines = _Splines(grid, time)
-    for cutoff in CUTOFFS[CUTOFFS * HIGHER * 2.0 * grid.step <= 1.0]:
+    for cutoff in CUTOFFS[highest_cutoff(grid.step) / HIGHER >= CUTOFFS]:
         left = values - splines.design @ splines.fitted(values, cutoff)
         if _noise_alone(time, left / noise, cutoff):
             return _input(splines, splines.fitted(values, HIGHER * cutoff), HIGHER * cutoff)
@@ -118,13 +119,12 @@ def _input(splines: _Splines, coefficients: Array, cutoff: float) -> NodeInput:
     smooth = SmoothInput(spline, grid.step, 0, grid.nodes)
     middle = np.zeros_like(values)
     middle[:-1] = smooth.at(0.0, between=0.5)[:-1] - 0.5 * (values[1:] + values[:-1])
-    held = max(1, round(1.0 / (2.0 * cutoff * grid.step)))
     return NodeInput(
         values,
         middle,
         smooth,
         np.zeros_like(values),
         np.zeros(grid.nodes),
-        held,
+        cutoff,
         float((2.0 * np.pi * cutoff) ** 2 / 3.0),
     )

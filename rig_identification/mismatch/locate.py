@@ -53,8 +53,8 @@ def silenced(problem: Problem, device: str) -> Problem:
         silent = replace(run, channels=channels)
         if device == DRIVE and run.force is not None:
             # A force of which nothing is known is another one in each interval
-            unheld = replace(run.force, held=1)
-            silent = replace(silent, force=unheld, exciter_noise=SILENT * run.exciter_noise)
+            rough = replace(run.force, cutoff=0.0)
+            silent = replace(silent, force=rough, exciter_noise=SILENT * run.exciter_noise)
         runs.append(silent)
     rests = tuple(
         replace(

@@ -14,31 +14,31 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rig_identification.estimate.prediction import Linearised
+from rig_identification.estimate.whitening import followed
 
 Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def _innovations(A, B, node, H, D, through, felt, each, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
+def _innovations(A, B, node, H, D, through, felt, follow, gains, deviations, wrenches, smooth, out):  # type: ignore[no-untyped-def]
     """out (m, c): normalised innovations of the responses to ``wrenches`` (N, 6, c).
 
-    through (N, X, 6), felt (m, 6), each: the filter's own noise, how it reaches the next state and each row,
-    and nodes from draw to draw (estimate/whitening.py). gains (m, X + 6), deviations (m,): the filter.
+    through (N, X, w), felt (m, w), follow (f, f): the filter's own noise, how it reaches the next state and
+    each row, and how it goes on (estimate/whitening.py). gains (m, X + w), deviations (m,): the filter.
     """
     nodes, states, count = A.shape[0], A.shape[1], wrenches.shape[2]
-    size = states + 12
+    own = felt.shape[1]
+    size = states + 6 + own
     unseen, after = np.zeros((size, count)), np.empty((states, count))
-    taken = np.zeros((6, count))  # what the filter takes for its own noise
+    taken = np.zeros((own, count))  # what the filter takes for its own noise
     seen = np.empty(count)
     F = np.empty((states, size))
     row = 0
     for k in range(nodes):
-        if k % each == 0:
-            if each > 1:
-                taken[:3] = taken[3:]
-                taken[3:] = 0.0
-            else:
-                taken[:] = 0.0
+        if follow.shape[0] > 0:
+            followed(taken, follow)
+        else:
+            taken[:] = 0.0
         while row < node.shape[0] and node[row] == k:
             seen[:] = 0.0
             for i in range(states):
@@ -48,7 +48,10 @@ def _innovations(A, B, node, H, D, through, felt, each, gains, deviations, wrenc
                         seen[c] += h * unseen[i, c]
             for i in range(6):
                 for c in range(count):
-                    seen[c] += D[row, i] * wrenches[k, i, c] - felt[row, i] * taken[i, c]
+                    seen[c] += D[row, i] * wrenches[k, i, c]
+            for i in range(own):
+                for c in range(count):
+                    seen[c] -= felt[row, i] * taken[i, c]
             for c in range(count):
                 seen[c] /= deviations[row]
                 out[row, c] = seen[c]
@@ -57,7 +60,7 @@ def _innovations(A, B, node, H, D, through, felt, each, gains, deviations, wrenc
                 if g != 0.0:
                     for c in range(count):
                         unseen[i, c] -= g * seen[c]
-            for i in range(6):
+            for i in range(own):
                 for c in range(count):
                     taken[i, c] += gains[row, states + i] * seen[c]
             row += 1
@@ -65,6 +68,8 @@ def _innovations(A, B, node, H, D, through, felt, each, gains, deviations, wrenc
         for i in range(6):
             for c in range(count):
                 unseen[states + i, c] = 0.5 * (wrenches[k, i, c] + wrenches[ahead, i, c])
+        for i in range(own):
+            for c in range(count):
                 unseen[states + 6 + i, c] = -taken[i, c]
         F[:, :states] = A[k]
         F[:, states : states + 6] = B[k]
@@ -83,7 +88,7 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     out = np.empty((run.nodes.size, wrenches.shape[2]))
     held = np.ascontiguousarray(wrenches)
     noise = run.noise
-    filtered = (noise.through, noise.felt, noise.each, *run.filter)
+    filtered = (noise.through, noise.felt, noise.follow, *run.filter)
     _innovations(A, B, run.nodes, run.row_H, run.row_D, *filtered, held, smooth, out)
     return out
 
