@@ -140,7 +140,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget, *, part: bool = False
         if law is not None:
             return law
         ideal = with_pieces(ideal, notify)
-        pushed = _gentle_push(ideal, problem, pulse, notify)
+        pushed = None if budget.spent() else _gentle_push(ideal, problem, pulse, notify)
         if pushed is not None:
             return pushed
     return None if part else unexplained(ideal, search, best, notify)
