@@ -53,16 +53,15 @@ def random_wrench(
     theta: Array,
     B: Array,
     D: Array,
-    node: NDArray[np.int64],
     felt: Array | None,
     extra: Array | None = None,
 ) -> RandomWrench:
     """What the error of a run's force does.
 
-    B (N, X, 6), D (m, 6): response of the next state, and of each row, to the wrench of an interval. node
-    (m,): of each row. felt (m,): std of the noise that a row feels at once, in that of an interval's; None
-    where a wrench that really acts is among it, which reaches every row as it is. extra (6, 6): covariance of
-    such a one over each interval.
+    B (N, X, 6), D (m, 6): response of the next state, and of each row, to the wrench of an interval. felt
+    (m,): std of the noise that a row feels at once, in that of an interval's; None where a wrench that really
+    acts is among it, which reaches every row as it is. extra (6, 6): covariance of such a one over each
+    interval.
     """
     if felt is None or run.force is None or run.force.cutoff == 0.0:
         Q = _of_intervals(run, parameters, theta)

@@ -302,7 +302,7 @@ def linearise_run(
     A, B, _, _, _ = motion.derivatives
     acts = extra_noise is not None or latent is not None
     felt = None if acts or not run.channels else np.array([c.felt for c in run.channels])[which]
-    noise = random_wrench(run, parameters, theta, B, D, at, felt, extra_noise)
+    noise = random_wrench(run, parameters, theta, B, D, felt, extra_noise)
     if np.any(noise.Q):
         log_spread = float(
             whiten(A, noise.through, noise.Q, held, at, H, noise.felt, variance, columns, noise.follow)
