@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +62,12 @@ class Estimates:
         on_top = np.diag([ordinary.get(name, 0.0) ** 2 for name in self.values])
         return Estimates(self.values, loose * self.covariance + on_top)
 
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.values)}
+
     def _index(self, name: str) -> int:
-        return list(self.values).index(name)
+        return self._places[name]
 
 
 def estimates(problem: Problem, evaluation: Evaluation, spread: Evaluation | None = None) -> Estimates:

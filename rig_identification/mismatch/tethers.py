@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.estimates import Estimates, parameter_estimates
+from rig_identification.estimate.estimates import Estimates, estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter
@@ -172,11 +172,11 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
     let_go = stiffness * float(np.max(np.abs(moved)))
     # A pull that never comes off is where the fit of the spring stands, and leads nowhere
     pulls = {1.0: 0.5 * let_go, -1.0: -0.5 * let_go}
-    estimates = parameter_estimates(problem, evaluation)
-    pull = next((p for p in estimates if p.name == f"tether.pull.{axis}"), None)
-    if pull is not None and abs(pull.value) - CERTAIN * pull.std > let_go:
+    told = estimates(problem, evaluation)
+    pull = f"tether.pull.{axis}"
+    if pull in told.values and abs(told.values[pull]) - CERTAIN * told.std(pull) > let_go:
         # Taut all the time: it only turns with the body
-        pulls = {float(np.sign(pull.value)): pull.value}
+        pulls = {float(np.sign(told.values[pull])): told.values[pull]}
     known = {f"tether.stiffness.{axis}": stiffness} | {
         f"tether.point.{a}": float(value) for a, value in zip(AXES, at, strict=True)
     }

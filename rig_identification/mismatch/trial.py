@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.estimates import parameter_estimates
+from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import (
@@ -431,8 +431,11 @@ def in_reach(trial: Trial) -> bool:
     if not names:
         return True
     size = float(np.max(extent(trial.problem.bench.rig)))
-    estimates = parameter_estimates(trial.problem, trial.evaluation)
-    return all(abs(p.value - p.nominal) - ABSURD * p.std <= size for p in estimates if p.name in names)
+    found = estimates(trial.problem, trial.evaluation)
+    coordinates = [p for p in trial.problem.bench.parameters.free if p.name in names]
+    return all(
+        abs(found.values[p.name] - p.nominal) - ABSURD * found.std(p.name) <= size for p in coordinates
+    )
 
 
 def _described(trial: Trial, candidate: Candidate, values: dict[str, float], stop: Stop) -> Trial | None:
