@@ -137,7 +137,7 @@ def test_smoother_is_the_posterior_mean(seed: int, how: tuple[bool, int]) -> Non
         gain = prior @ part.T @ np.linalg.inv(part @ prior @ part.T + np.diag(s.variance[rows]))
         after = (np.eye(prior.shape[0]) - gain @ part) @ prior
         expected = s.state_response[k] @ after @ s.state_response[k].T
-        np.testing.assert_allclose(filtered[k], expected, atol=1e-6 * np.max(np.abs(expected)) + 1e-10)
+        np.testing.assert_allclose(filtered[k], expected, atol=1e-8 * np.max(np.abs(expected)) + 1e-10)
 
 
 def test_innovations_of_a_simulated_system_are_white() -> None:

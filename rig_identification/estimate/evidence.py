@@ -302,9 +302,7 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
             force = smooth_force(grid, exciter.time, exciter.values, std) or force
     channels = tuple(c for c in found if c is not None)
     run = Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
-    if force is None:
-        return run
-    if force.cutoff > 0.0:
+    if force is None or force.cutoff > 0.0:
         return run
     felt = noise_felt(grid, known.time, run.samplers)
     return replace(run, channels=tuple(replace(c, felt=f) for c, f in zip(channels, felt, strict=True)))

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.estimate.band_limited import POLES, shaping
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import ParameterSet
+from rig_identification.estimate.sampling import NodeInput
 from rig_identification.model import layout
 
 Array = NDArray[np.float64]
@@ -69,7 +70,7 @@ def random_wrench(
         return RandomWrench(Q if extra is None else Q + extra, WHITE, B, at_once, np.eye(6))
     spread = exciter_wrench_map(parameters, theta)
     follow, reads = shaping(run.force.cutoff, run.grid.step)
-    begun = _variance(run, parameters, theta) * np.eye(3 * POLES)
+    begun = _variance(run, run.force, parameters, theta) * np.eye(3 * POLES)
     carried = np.kron(follow, np.eye(3))
     # Midway to the next node all but what is drawn there is known
     midway = 0.5 * (reads + reads @ follow)
@@ -82,16 +83,14 @@ def random_wrench(
     )
 
 
-def _variance(run: Run, parameters: ParameterSet, theta: Array) -> float:
-    """Variance (N2) of each component that the samples' noise has over an interval.
+def _variance(run: Run, force: NodeInput, parameters: ParameterSet, theta: Array) -> float:
+    """Variance (N2) of each component that the samples' noise has over an interval of a run's ``force``.
 
     Where a low-pass is undone the noise of the force's rate is added.
     """
-    if run.force is None:
-        return 0.0
     tau = parameters.device(theta)[parameters.places.lag("exciter")]
     mean = run.exciter_noise**2 / (run.exciter_rate * run.grid.step)
-    return float(mean * (1.0 + tau**2 * run.force.rate_noise))
+    return float(mean * (1.0 + tau**2 * force.rate_noise))
 
 
 def _of_intervals(run: Run, parameters: ParameterSet, theta: Array) -> Array:
@@ -104,7 +103,7 @@ def _of_intervals(run: Run, parameters: ParameterSet, theta: Array) -> Array:
     if run.force is None or (run.exciter_noise == 0.0 and not np.any(run.force.doubt)):
         return out
     spread = exciter_wrench_map(parameters, theta)
-    noise = _variance(run, parameters, theta)
+    noise = _variance(run, run.force, parameters, theta)
     out[:] = (noise + run.force.doubt)[:, None, None] * (spread @ spread.T)
     jumps = spread @ run.force.jumps[:, :, None]
     # Where a jump's moment is uniform over an interval, its impulse varies by jump^2 step^2 / 12

@@ -51,8 +51,11 @@ def _drawn(P, Q, follow, k):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def followed(X, follow):  # type: ignore[no-untyped-def]
-    """Take rows ``X`` (w, c) of noise from one node to the next."""
+    """Take rows ``X`` (w, c) of noise from one node to the next, where white noise is over."""
     order, count = follow.shape[0], X.shape[1]
+    if order == 0:
+        X[:] = 0.0
+        return
     old = X.copy()
     for i in range(order):
         for axis in range(ONE):
@@ -68,14 +71,11 @@ def followed(X, follow):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _expected(X, states, latent, follow, k):  # type: ignore[no-untyped-def]
     """Write what is expected of the noise after node ``k`` into ``X`` (x + w, c): column 0 is a residual."""
-    if follow.shape[0] > 0:
-        if k > 0:
-            followed(X[states:], follow)
-        return
-    for i in range(states, X.shape[0]):
-        for c in range(X.shape[1]):
-            X[i, c] = 0.0
-        X[i, 0] -= latent[k, i - states]
+    if k > 0:
+        followed(X[states:], follow)
+    if follow.shape[0] == 0:
+        for i in range(states, X.shape[0]):
+            X[i, 0] -= latent[k, i - states]
 
 
 @njit(cache=True, nogil=True)

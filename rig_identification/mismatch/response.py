@@ -35,10 +35,7 @@ def _innovations(A, B, node, H, D, through, felt, follow, gains, deviations, wre
     F = np.empty((states, size))
     row = 0
     for k in range(nodes):
-        if follow.shape[0] > 0:
-            followed(taken, follow)
-        else:
-            taken[:] = 0.0
+        followed(taken, follow)
         while row < node.shape[0] and node[row] == k:
             seen[:] = 0.0
             for i in range(states):
