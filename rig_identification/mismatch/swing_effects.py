@@ -17,6 +17,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, sol
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import needed_gain
+from rig_identification.mismatch.rolling import rolling_otherwise
 from rig_identification.mismatch.screen import carried, extended, free_without
 from rig_identification.mismatch.subsets import best_subset
 from rig_identification.mismatch.trial import Trial, finished, log_evidence
@@ -123,7 +124,8 @@ def damped(
     tried = _better(base, evaluation, dampers, count, told(0.2))
     if not tried:
         return None
-    first = tried[0]
+    notify("search: how it rolls", 0.3)
+    first = rolling_otherwise(tried[0])
     held = _better(first.problem, first.evaluation, holds, count, told(0.35))
     others = tuple(c for c in candidates if c not in holds)
     choice = Choice((first.candidate,), (), others, tuple(tried))

@@ -32,20 +32,7 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
     size = float(np.max(extent(rig)))
     speed = np.sqrt(rig.gravity * length)
     out = [
-        Candidate(
-            "hinge_damping",
-            (
-                added(
-                    "hinge.bending", "N*m*s/rad", 0.1 * mass * length * speed / (2 * n), block + place.BENDING
-                ),
-            ),
-            "The cables' hinges damp the motion as they bend, and twist freely: each puts {value} against "
-            "the rate at which it bends.",
-            "Use knife edges or ball joints, or keep the damping in the model.",
-            {"channel": None, "axis": None},
-            positive=1,
-            name_in_result="damping",
-        ),
+        *(_bending(block, k, 0.1 * mass * length * speed / (2 * n)) for k in range(2)),
         *(_plates(block, size, k) for k in range(2)),
         Candidate(
             "unknown",
@@ -66,8 +53,69 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
             name_in_result="cubic_moment",
         ),
     ]
-    line = _line_of_hinges(rig)
+    out += [_held_end(rig, i, LOOP * mass * rig.gravity / n * rig.cables[i].length) for i in range(n)]
+    line = line_of_hinges(rig)
     return out if line is None else [*out, _rolling(rig, mass, size, line)]
+
+
+def _bending(block: int, k: int, std: float) -> Candidate:
+    """Hinges at the ceiling (``k`` 0) or at the body that damp as they bend and twist freely."""
+    end = ("ceiling", "body")[k]
+    return Candidate(
+        "hinge_damping",
+        (added(f"hinge.bending_{end}", "N*m*s/rad", std, block + place.BENDING + k),),
+        f"The cables' hinges at the {end} damp the motion as they bend, and twist freely: each puts {{value}} "
+        "against the rate at which it bends.",
+        "Use knife edges or ball joints, or keep the damping in the model.",
+        {"channel": None, "axis": None, "end": end},
+        positive=1,
+        name_in_result="damping",
+    )
+
+
+def _held_end(rig: Rig, i: int, std: float) -> Candidate:
+    """The upper end of cable ``i`` holds it as it leans, or goes along. std: N m/rad."""
+    name, n = rig.cables[i].name, len(rig.cables)
+    first = layout.cable_offset(i) + layout.LEAN
+    lean = tuple(
+        added(f"{name}.held_{axes}", "N*m/rad", std, first + k) for k, axes in enumerate(("xx", "xy", "yy"))
+    )
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        physics = model.physics.copy()
+        physics[layout.effects_offset(n) + place.LEANING] = 1.0
+        return model.with_physics(physics), lean
+
+    def told(found: Estimates) -> Told:
+        """Stiffness along the axis of the two that is held or yields most, that axis, and the other."""
+        names = [p.name for p in lean]
+
+        def axis(xx: float, xy: float, yy: float) -> float:
+            return 0.5 * math.atan2(2.0 * xy, xx - yy)
+
+        return {
+            "stiffness": (*found.following(lambda *k: _principal(*k, 1.0), *names), "N*m/rad"),
+            "stiffness_across": (*found.following(lambda *k: _principal(*k, -1.0), *names), "N*m/rad"),
+            "azimuth": (*found.following(axis, *names), "rad"),
+        }
+
+    return Candidate(
+        "unknown",
+        lean,
+        f"The upper end of {name} is no point: it holds the cable with {{value}} as it leans to the side of "
+        "azimuth {told[azimuth]} in the world, and with {told[stiffness_across]} across that (negative: it goes "
+        "along). A loop round a beam, a clamp or a support that gives way does that. Alike at all cables it "
+        "turns the body back about the vertical as well, which no motion tells from its inertia.",
+        "Hang the cables on single points: a small shackle, a ball joint. Measure the length from there.",
+        {"channel": name, "axis": None, "end": "ceiling"},
+        tell=told,
+        build=build,
+    )
+
+
+def _principal(xx: float, xy: float, yy: float, side: float) -> float:
+    """The larger (``side`` 1) or smaller (-1) principal value of a symmetric matrix."""
+    return 0.5 * (xx + yy) + side * math.hypot(0.5 * (xx - yy), xy)
 
 
 def _plates(block: int, size: float, face: int) -> Candidate:
@@ -108,6 +156,8 @@ def _as_hinges(found: Estimates) -> Told:
     }
 
 
+#: Height of the loop in which a cable may end, as a share of its length: std of what an upper end holds with.
+LOOP = 0.1
 #: Std of the angle (rad) between the line of hinges and the axis about which they hold: bridles tied by hand.
 SKEW = 0.3
 #: Share of a body axis in the line of the hinges above which its elements have to do with rolling about it.
@@ -167,7 +217,7 @@ def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
     )
 
 
-def _line_of_hinges(rig: Rig) -> np.ndarray | None:
+def line_of_hinges(rig: Rig) -> np.ndarray | None:
     """(3,) direction of the line that all body hinges lie on; None where they span a plane."""
     points = np.array([c.body_point for c in rig.cables])
     _, sizes, axes = np.linalg.svd(points - np.mean(points, axis=0))

@@ -15,6 +15,7 @@ from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.cable_torsion import add_cable_torsion
 from rig_identification.model.effects.exciter_rotor import add_exciter_rotor
 from rig_identification.model.effects.gyroscopic_share import add_gyroscopic_share
+from rig_identification.model.effects.held_ends import add_held_ends
 from rig_identification.model.effects.hinge_bending import add_hinge_bending
 from rig_identification.model.effects.hinge_damping import add_hinge_damping
 from rig_identification.model.effects.hinge_friction import add_hinge_friction
@@ -29,6 +30,7 @@ from rig_identification.model.effects.place import (
     FRICTION,
     GYROSCOPIC_SHARE,
     LAW_SPRING,
+    LEANING,
     LINEAR_DENSITY,
     PLATES,
     ROLL_STIFFNESS,
@@ -67,8 +69,8 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     body = body or active(physics[block + PLATES]) or active(physics[block + PLATES + 1])
     rotor, rods = active(physics[block + ROTOR_MASS]), active(physics[block + LINEAR_DENSITY])
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
-    hinges = hinges or active(physics[block + BENDING]) or active(physics[block + ROLL_STIFFNESS])
-    hinges = hinges or _any_active(physics, block + TORSION, 4)
+    hinges = hinges or _any_active(physics, block + BENDING, 2) or active(physics[block + ROLL_STIFFNESS])
+    hinges = hinges or _any_active(physics, block + TORSION, 4) or active(physics[block + LEANING])
     return body, rotor or rods or _riders(physics, modes, internal), rotor, rods or hinges
 
 
@@ -141,12 +143,14 @@ def _add_at_cables(physics, block, modes, cables, x, R, K, r):  # type: ignore[n
         add_hinge_damping(physics, block, modes, cables, x, R, r)
     if active(physics[block + FRICTION]):
         add_hinge_friction(physics, block, modes, cables, x, R, r)
-    if active(physics[block + BENDING]):
+    if _any_active(physics, block + BENDING, 2):
         add_hinge_bending(physics, block, modes, cables, x, R, r)
     if active(physics[block + ROLL_STIFFNESS]):
         add_hinge_roll(physics, block, modes, x, R, r)
     if _any_active(physics, block + TORSION, 4):
         add_cable_torsion(physics, block, modes, cables, x, R, r)
+    if active(physics[block + LEANING]):
+        add_held_ends(physics, block, modes, cables, x, R, r)
     if active(physics[block + LINEAR_DENSITY]):
         add_cable_mass(physics, block, modes, cables, x, R, K, r)
 

@@ -21,5 +21,5 @@ def add_hinge_damping(physics, block, modes, cables, x, R, r):  # type: ignore[n
     damping = physics[block + DAMPING]
     if active(damping):
         add_hinge_moments(
-            physics, modes, cables, x, R, damping, 0.0 * damping, physics[block + CREEP], 1.0, r
+            physics, modes, cables, x, R, (damping, damping), 0.0 * damping, physics[block + CREEP], 1.0, r
         )

@@ -13,4 +13,7 @@ def add_hinge_friction(physics, block, modes, cables, x, R, r):  # type: ignore[
     """Add the force and moment of some cables' rubbing hinges to r."""
     torque = physics[block + FRICTION]
     if active(torque):
-        add_hinge_moments(physics, modes, cables, x, R, 0.0 * torque, torque, physics[block + CREEP], 1.0, r)
+        none = 0.0 * torque
+        add_hinge_moments(
+            physics, modes, cables, x, R, (none, none), torque, physics[block + CREEP], 1.0, r
+        )

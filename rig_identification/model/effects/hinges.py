@@ -26,7 +26,7 @@ def _law(viscous, rubbing, creep, a, b, c):  # type: ignore[no-untyped-def]
 def add_hinge_moments(physics, modes, cables, x, R, viscous, rubbing, creep, twist, r):  # type: ignore[no-untyped-def]
     """Add to r (6 rows) the wrench of moments -(viscous + rubbing/|rate|) rate in the hinges of some cables.
 
-    cables: first and last but one of them, as in range().
+    cables: first and last but one of them, as in range(). viscous (2,): at the ceiling and at the body.
     creep (rad/s): rate below which rubbing grows with the rate instead of jumping, as dry bearings do.
     twist: 1 where a hinge resists being twisted as it resists being bent, 0 where it twists freely.
     """
@@ -53,8 +53,8 @@ def add_hinge_moments(physics, modes, cables, x, R, viscous, rubbing, creep, twi
         off = spin - half
         ax, ay, az = ax - off * ex, ay - off * ey, az - off * ez
         ox, oy, oz = ox + half * ex, oy + half * ey, oz + half * ez
-        lower = _law(viscous, rubbing, creep, ax, ay, az)
-        upper = _law(viscous, rubbing, creep, ox, oy, oz)
+        lower = _law(viscous[1], rubbing, creep, ax, ay, az)
+        upper = _law(viscous[0], rubbing, creep, ox, oy, oz)
         # Net moment on the cable, then the force across it at the body's hinge
         mx, my, mz = lower * ax - upper * ox, lower * ay - upper * oy, lower * az - upper * oz
         fx = -(ey * mz - ez * my) * per_length
