@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 PIECE = 4.0
 
 
-def pieces(run: Run, length: float = PIECE) -> tuple[Run, ...]:
+def pieces_of(run: Run, length: float = PIECE) -> tuple[Run, ...]:
     """A run cut into equal pieces of about ``length`` seconds."""
     nodes = run.grid.nodes
     count = max(1, round(run.grid.duration / length))
@@ -40,7 +40,7 @@ def in_pieces(
     problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...], length: float = PIECE
 ) -> tuple[Problem, Point]:
     """The same problem with every run in pieces, and a point with a start state for each."""
-    cut = tuple(piece for run in problem.runs for piece in pieces(run, length))
+    cut = tuple(piece for run in problem.runs for piece in pieces_of(run, length))
     starts = launch_states(problem.bench, cut, theta, rest)
     return replace(problem, runs=cut), Point(theta, starts, rest_guesses)
 
@@ -81,7 +81,7 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
     The yardstick is the better half of the pieces. A piece at rest fits always and says nothing; what the
     model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand.
     """
-    cut = pieces(run, SHORT_PIECE)
+    cut = pieces_of(run, SHORT_PIECE)
     errors = np.full(len(cut), np.inf)
     swing = _swing(run, cut)
     for i, piece in enumerate(cut):

@@ -28,7 +28,7 @@ INNER, INNER_RATE = 0.0005, 10.0
 
 
 @dataclass(frozen=True)
-class _Doubts:
+class Doubts:
     """What rig and devices may be off by, to first order, taken out of a run's normal equations.
 
     With r = J_s c + J_d d + e, d ~ N(0, spread^2), e ~ N(0, 1), the best d for any c is linear, and what is
@@ -85,7 +85,7 @@ def fit_start(
     extra_noise (6, 6): see :func:`linearise_run`. spread: std of a prior on the start about
     ``start`` (m, rad; twice as much m/s, rad/s; INNER of it for what swings or yields within the rig).
     polish: see :func:`solve`. doubted: std, in tolerances, of what is believed of rig and devices
-    (:class:`_Doubts`).
+    (:class:`Doubts`).
     """
     p = bench.parameters.size
     model = model_at(bench.parameters, theta)
@@ -101,7 +101,7 @@ def fit_start(
     dof = (moved_so_far.size - inner) // 2
     allowed = [1.0] * dof + [2.0] * dof + [INNER] * (inner // 2) + [INNER * INNER_RATE] * (inner // 2)
     weight = (START_UNIT / (spread * np.array(allowed))) ** 2
-    doubts = _Doubts(p, doubted)
+    doubts = Doubts(p, doubted)
     for _ in range(iterations):
         information, gradient = doubts.eliminated(current)
         information = information + np.diag(weight)

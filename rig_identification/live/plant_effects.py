@@ -73,6 +73,10 @@ class PlantEffects:
 
     hinge_damping: float = 0.0  # N m s/rad, each hinge
     hinge_friction: float = 0.0  # N m, each hinge
+    hinge_bending: Array = field(default_factory=lambda: np.zeros(2))  # N m s/rad, at ceiling and body
+    held_ends: Array = field(
+        default_factory=lambda: np.zeros((1, 3))
+    )  # (n, 3) N m/rad: xx, xy, yy of upper ends
     air_drag: float = 0.0  # m^2, Cd A
     air_plates: Array = field(default_factory=lambda: np.zeros(2))  # m^2, Cd A of sides facing body x and y
     plate_reach: float = 0.5  # m
@@ -114,6 +118,11 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     block = place.effects_block(model.cables)
     physics[block + place.DAMPING] = effects.hinge_damping
     physics[block + place.FRICTION] = effects.hinge_friction
+    physics[block + place.BENDING : block + place.BENDING + 2] = effects.hinge_bending
+    physics[block + place.LEANING] = float(np.any(effects.held_ends))
+    for i, held in enumerate(np.broadcast_to(effects.held_ends, (model.cables, 3))):
+        o = layout.cable_offset(i)
+        physics[o + layout.LEAN : o + layout.LEAN + 3] = held
     physics[block + place.DRAG_AREA] = effects.air_drag
     physics[block + place.PLATES : block + place.PLATES + 2] = effects.air_plates
     physics[block + place.PLATE_REACH] = effects.plate_reach

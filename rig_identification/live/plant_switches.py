@@ -63,6 +63,8 @@ _NOWHERE, _X = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 SWITCHES = (
     Switch("hinge_damping", 0.0, "N m s/rad of each hinge", 0.0, 1e6),
     Switch("hinge_friction", 0.0, "N m of each hinge", 0.0, 1e6),
+    Switch("hinge_bending", (0.0, 0.0), "N m s/rad of bending hinges: ceiling, body", 0.0, 1e6, "", 2),
+    Switch("held_ends", (0.0,), "N m/rad: xx, xy, yy of upper ends, each or all", -1e9, 1e9, "", POINTS),
     Switch("air_drag", 0.0, "Cd A, m^2", 0.0, 1e4, "m^2"),
     Switch("air_plates", (0.0, 0.0), "Cd A of the sides that face the body's x and y", 0.0, 1e4, "m^2", 2),
     Switch("air_plates.reach", 0.5, "m from the centre of mass to the body's sides", 0.0, 100.0, "m"),
@@ -151,6 +153,8 @@ def effects_of(
     return PlantEffects(
         hinge_damping=number("hinge_damping"),
         hinge_friction=number("hinge_friction"),
+        hinge_bending=values["hinge_bending"],
+        held_ends=_tensors(values["held_ends"]),
         air_drag=number("air_drag"),
         air_plates=values["air_plates"],
         plate_reach=number("air_plates.reach"),
@@ -184,6 +188,11 @@ def effects_of(
 
 def _points(values: Array) -> Array:
     return values.reshape(-1, 3) if values.size > 1 else np.full((1, 3), values[0])
+
+
+def _tensors(values: Array) -> Array:
+    """(1 or n, 3) xx, xy, yy; one number is alike to all sides."""
+    return values.reshape(-1, 3) if values.size > 1 else np.array([[values[0], 0.0, values[0]]])
 
 
 def _direction(values: Mapping[str, Array], effect: str, prefix: str) -> Array:

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.estimate.cautious import coherence, reweighted
+from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.observability import invert_information
+from rig_identification.estimate.rolling import ways_of_rolling
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import needed_gain
-from rig_identification.mismatch.rolling import rolling_otherwise
 from rig_identification.mismatch.screen import carried, extended, free_without
 from rig_identification.mismatch.subsets import best_subset
 from rig_identification.mismatch.trial import Trial, finished, log_evidence
@@ -48,6 +49,23 @@ def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Tr
     except FloatingPointError:
         return None
     return finished(Trial(candidate, wide, fitted, log_evidence(fitted), True))
+
+
+def _rolling_otherwise(trial: Trial) -> Trial:
+    """The trial with its body rolling otherwise (estimate/rolling.py), where that is likelier."""
+    problem, point = trial.problem, trial.evaluation.point
+    best = trial
+    for theta in ways_of_rolling(problem, problem.runs, point.theta, point.starts[0]):
+        starts = launch_states(problem.bench, problem.runs, theta, point.starts[0])
+        start = replace(point, theta=theta, starts=starts)
+        try:
+            fitted, _ = solve(problem, start, iterations=2 * STEPS, tolerance=0.5)
+        except FloatingPointError:
+            continue
+        again = finished(Trial(trial.candidate, problem, fitted, log_evidence(fitted), True))
+        if again is not None and again.evidence > best.evidence:
+            best = again
+    return best
 
 
 def _weighed(raw: Problem, problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
@@ -115,7 +133,7 @@ def damped(
     which is no matter of degree. Beside that all others are chosen anew, until the choice stays.
     """
     dampers = [c for c in candidates if c.effect in DAMPERS]
-    holds = [c for c in candidates if c.hides]
+    holds = [c for c in candidates if c.settle is not None]
     count = len(candidates)
 
     def told(share: float) -> Callable[[str], None]:
@@ -125,7 +143,7 @@ def damped(
     if not tried:
         return None
     notify("search: how it rolls", 0.3)
-    first = rolling_otherwise(tried[0])
+    first = _rolling_otherwise(tried[0])
     held = _better(first.problem, first.evaluation, holds, count, told(0.35))
     others = tuple(c for c in candidates if c not in holds)
     choice = Choice((first.candidate,), (), others, tuple(tried))

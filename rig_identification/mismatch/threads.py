@@ -12,6 +12,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import believed_point
 from rig_identification.estimate.parameters import INERTIAL, Parameter
+from rig_identification.estimate.rolling import line_of_hinges
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.model import layout
@@ -49,12 +50,12 @@ def physics_of_pendulums(rig: Rig, mass: float) -> list[Candidate]:
             "Air that goes along with wide turns does that, or hinges that slip.",
             "For the inertia about the vertical use small turns; a plate of known size hung beside tells air "
             "from hinges.",
-            {"channel": None, "axis": "z"},
+            {"channel": None, "axis": "z", "law": "turn that softens"},
             name_in_result="cubic_moment",
         ),
     ]
-    out += [_held_end(rig, i, LOOP * mass * rig.gravity / n * rig.cables[i].length) for i in range(n)]
     line = line_of_hinges(rig)
+    out += [_held_end(rig, mass, i, () if line is None else hidden_by_roll(line)) for i in range(n)]
     return out if line is None else [*out, _rolling(rig, mass, size, line)]
 
 
@@ -64,8 +65,8 @@ def _bending(block: int, k: int, std: float) -> Candidate:
     return Candidate(
         "hinge_damping",
         (added(f"hinge.bending_{end}", "N*m*s/rad", std, block + place.BENDING + k),),
-        f"The cables' hinges at the {end} damp the motion as they bend, and twist freely: each puts {{value}} "
-        "against the rate at which it bends.",
+        f"The cables' hinges at the {end} damp the motion as they bend, and twist freely: each puts "
+        "{value} against the rate at which it bends.",
         "Use knife edges or ball joints, or keep the damping in the model.",
         {"channel": None, "axis": None, "end": end},
         positive=1,
@@ -73,9 +74,10 @@ def _bending(block: int, k: int, std: float) -> Candidate:
     )
 
 
-def _held_end(rig: Rig, i: int, std: float) -> Candidate:
-    """The upper end of cable ``i`` holds it as it leans, or goes along. std: N m/rad."""
+def _held_end(rig: Rig, mass: float, i: int, hides: tuple[str, ...]) -> Candidate:
+    """The upper end of cable ``i`` holds it as it leans, or goes along (effects/held_ends.py)."""
     name, n = rig.cables[i].name, len(rig.cables)
+    std = LOOP * mass * rig.gravity / n * rig.cables[i].length
     first = layout.cable_offset(i) + layout.LEAN
     lean = tuple(
         added(f"{name}.held_{axes}", "N*m/rad", std, first + k) for k, axes in enumerate(("xx", "xy", "yy"))
@@ -89,33 +91,39 @@ def _held_end(rig: Rig, i: int, std: float) -> Candidate:
     def told(found: Estimates) -> Told:
         """Stiffness along the axis of the two that is held or yields most, that axis, and the other."""
         names = [p.name for p in lean]
-
-        def axis(xx: float, xy: float, yy: float) -> float:
-            return 0.5 * math.atan2(2.0 * xy, xx - yy)
-
         return {
-            "stiffness": (*found.following(lambda *k: _principal(*k, 1.0), *names), "N*m/rad"),
-            "stiffness_across": (*found.following(lambda *k: _principal(*k, -1.0), *names), "N*m/rad"),
-            "azimuth": (*found.following(axis, *names), "rad"),
+            "stiffness": (*found.following(_largest, *names), "N*m/rad"),
+            "stiffness_across": (*found.following(_smallest, *names), "N*m/rad"),
+            "azimuth": (*found.following(_azimuth, *names), "rad"),
         }
 
     return Candidate(
         "unknown",
         lean,
-        f"The upper end of {name} is no point: it holds the cable with {{value}} as it leans to the side of "
-        "azimuth {told[azimuth]} in the world, and with {told[stiffness_across]} across that (negative: it goes "
-        "along). A loop round a beam, a clamp or a support that gives way does that. Alike at all cables it "
-        "turns the body back about the vertical as well, which no motion tells from its inertia.",
-        "Hang the cables on single points: a small shackle, a ball joint. Measure the length from there.",
-        {"channel": name, "axis": None, "end": "ceiling"},
+        f"The upper end of {name} is no point: it holds the cable with {{value}} as it leans towards "
+        "azimuth {told[azimuth]} in the world, and with {told[stiffness_across]} across that (negative: it "
+        "goes along), as a loop round a beam, a clamp or a support that gives way does.",
+        "Hang the cables on single points: a small shackle, a ball joint. Measure their lengths from there.",
+        {"channel": name, "axis": None, "end": "ceiling", "law": "held end"},
         tell=told,
         build=build,
+        hides=hides,
     )
 
 
-def _principal(xx: float, xy: float, yy: float, side: float) -> float:
-    """The larger (``side`` 1) or smaller (-1) principal value of a symmetric matrix."""
-    return 0.5 * (xx + yy) + side * math.hypot(0.5 * (xx - yy), xy)
+def _largest(xx: float, xy: float, yy: float) -> float:
+    """The larger principal value of a symmetric matrix."""
+    return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
+
+
+def _smallest(xx: float, xy: float, yy: float) -> float:
+    """The smaller one."""
+    return 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+
+
+def _azimuth(xx: float, xy: float, yy: float) -> float:
+    """Angle (rad) of the larger one's axis from x."""
+    return 0.5 * math.atan2(2.0 * xy, xx - yy)
 
 
 def _plates(block: int, size: float, face: int) -> Candidate:
@@ -208,17 +216,10 @@ def _rolling(rig: Rig, mass: float, size: float, line: np.ndarray) -> Candidate:
         "mean direction of its cables, as a bridle, a loop round a bar or a stiff knot does. What such "
         "hinges do to the turning about the vertical cannot be told from inertia, and is left out.",
         "Hang the body on single points, or keep the stiffness in the model.",
-        {"channel": None, "axis": None, "end": "body"},
+        {"channel": None, "axis": None, "end": "body", "law": "hold against rolling"},
         positive=1,
         tell=_as_hinges,
         build=build,
         settle=settle,
         hides=hidden_by_roll(line),
     )
-
-
-def line_of_hinges(rig: Rig) -> np.ndarray | None:
-    """(3,) direction of the line that all body hinges lie on; None where they span a plane."""
-    points = np.array([c.body_point for c in rig.cables])
-    _, sizes, axes = np.linalg.svd(points - np.mean(points, axis=0))
-    return None if sizes[0] <= 0.0 or sizes[1] > 1e-2 * sizes[0] else np.asarray(axes[0])

@@ -4,7 +4,7 @@ With e_i the direction of cable i in the world (ceiling to body), f_i the one at
 part of e_i - f_i, the end stores 1/2 q' K q, K symmetric: a loop holds in its own plane and leaves the cable
 free across it. With l the cable's length that puts the force -(1 - e e') K q / l on the body at its hinge,
 and the moment that goes with it on the ceiling. A cable that ends in a loop of height h swings in the loop's
-plane as if it were shorter by h, which is k = T l h/(l - h) under the tension T; k < 0 is an end that goes along.
+plane as if it were shorter by h: k = T l h/(l - h) under the tension T. With k < 0 an end goes along.
 """
 
 from __future__ import annotations

@@ -14,6 +14,4 @@ def add_hinge_friction(physics, block, modes, cables, x, R, r):  # type: ignore[
     torque = physics[block + FRICTION]
     if active(torque):
         none = 0.0 * torque
-        add_hinge_moments(
-            physics, modes, cables, x, R, (none, none), torque, physics[block + CREEP], 1.0, r
-        )
+        add_hinge_moments(physics, modes, cables, x, R, (none, none), torque, physics[block + CREEP], 1.0, r)
