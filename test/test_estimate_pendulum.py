@@ -138,17 +138,19 @@ def test_what_damps_it_is_found(cradle: Answered) -> None:
     first, second = cradle.session.rig.cables
     lean = 0.5 * float(np.linalg.norm(first.body_point - second.body_point)) / first.length
     amplitude = float(np.mean([yaw_rate_amplitude(r) for r in cradle.session.recordings]))
-    power = 0.0
+    power, clear = 0.0, []
     for f in dampers:
+        first_of_it = next(iter(f.parameters.values()))
+        value = float(first_of_it["value"])  # type: ignore[arg-type]
+        clear.append(value / float(first_of_it["std"]))  # type: ignore[arg-type]
         if f.effect == "hinge_damping":
-            value, std = f.parameters["damping"]["value"], f.parameters["damping"]["std"]
-            assert 0.0 < std < 0.5 * value  # type: ignore[operator]
             twists = "twist freely" not in f.statement
             ends = 1 if "end" in f.where else 2
-            power += float(value) * (2.0 * ends * lean**2 + (1.0 if twists else 0.0))  # type: ignore[arg-type]
+            power += value * (2.0 * ends * lean**2 + (1.0 if twists else 0.0))
         elif "turning_drag" in f.parameters:
             moment = 0.5 * 1.2 * float(f.parameters["turning_drag"]["value"]) * amplitude  # type: ignore[arg-type]
             power += moment * 8.0 / (3.0 * np.pi)
+    assert max(clear) > 2.0
     assert power == pytest.approx(2.0 * 0.03 * element(cradle.answer, "Jzz"), rel=0.3)
     damping = dampers[0]
     before, after = damping.evidence["holdout_error_before"], damping.evidence["holdout_error_after"]

@@ -58,3 +58,15 @@ def test_what_cannot_be_negative_is_left_out_where_it_would_be() -> None:
     best, covariance = posterior(design, data)
     assert best_subset(best, covariance, [[0], [1]], [True, True], [2.0, 2.0]) == (0,)
     assert best_subset(best, covariance, [[0], [1]], [True, False], [2.0, 2.0]) == (0, 1)
+
+
+def test_of_two_laws_of_one_thing_one_is_kept() -> None:
+    rng = np.random.default_rng(6)
+    design = rng.standard_normal((100, 3))
+    data = design @ [1.5, 1.0, 1.2] + rng.standard_normal(100)
+    best, covariance = posterior(design, data)
+    groups, amounts, penalties = [[0], [1], [2]], [True] * 3, [2.0] * 3
+    assert best_subset(best, covariance, groups, amounts, penalties) == (0, 1, 2)
+    apart = best_subset(best, covariance, groups, amounts, penalties, [(0, 1)])
+    without = [evidence(design[:, [k, 2]], data) for k in (0, 1)]
+    assert apart == (int(np.argmax(without)), 2)

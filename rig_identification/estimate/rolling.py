@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.start_state import Doubts, fit_start
 from rig_identification.model.motion import State
@@ -82,7 +83,7 @@ def ways_of_rolling(problem: Problem, pieces: tuple[Run, ...], theta: Array, res
         return []
     span = float(np.mean([piece.grid.duration for piece in pieces]))
     bodies = _bodies(problem, theta, line, span)
-    left = np.array([_left(problem, pieces, body, rest) for body in bodies])
+    left = np.array(side_by_side(lambda body: _left(problem, pieces, body, rest), bodies))
     around = np.concatenate([[np.inf], left, [np.inf]])
     lowest = np.flatnonzero((left < around[:-2]) & (left <= around[2:]))
     return [bodies[k] for k in lowest[np.argsort(left[lowest])][:TRIED]]

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 
 
 def effects_of(findings: Sequence[Finding]) -> str:
-    """Effects by name; what the contract's table has no word for, by its law and where it is."""
-    return ", ".join(called(f.effect, f.where) for f in findings)
+    """Effects by name, each once; what the contract's table has no word for, by its law and where it is."""
+    return ", ".join(dict.fromkeys(called(f.effect, f.where) for f in findings))
 
 
 def called(effect: str, where: Mapping[str, object]) -> str:

@@ -20,19 +20,27 @@ Array = NDArray[np.float64]
 
 
 def best_subset(
-    best: Array, covariance: Array, groups: list[list[int]], positive: list[bool], penalties: list[float]
+    best: Array,
+    covariance: Array,
+    groups: list[list[int]],
+    positive: list[bool],
+    penalties: list[float],
+    apart: list[tuple[int, int]] | None = None,
 ) -> tuple[int, ...]:
     """Groups of numbers (effects) that belong into the model.
 
     best: (n,) where the cost is lowest, in units of the prior's std; covariance: (n, n) there; groups: which
     of these numbers are each effect's; positive: whether the first of them cannot be negative; penalties:
-    nats that an effect has to gain beyond its evidence. Returns the kept effects' places in ``groups``.
+    nats that an effect has to gain beyond its evidence; apart: pairs of effects of which one alone can be.
+    Returns the kept effects' places in ``groups``.
     """
     chosen: tuple[int, ...] = ()
     highest = -np.inf
     everything = range(len(groups))
     for count in range(len(groups) + 1):
         for kept in combinations(everything, count):
+            if any(a in kept and b in kept for a, b in apart or ()):
+                continue
             out = [i for k in everything if k not in kept for i in groups[k]]
             value, score = best, 0.0
             if out:

@@ -35,6 +35,16 @@ FIRST_VALUE = 0.02
 ROUNDS = 5
 
 
+def _alike_everywhere(one: Candidate, other: Candidate) -> bool:
+    """Whether ``one`` is the same effect as ``other``, everywhere alike where that is at a place of its own.
+
+    Two laws of one thing, of which together the first makes what the second lacks: air that acts on the
+    centre of mass alone, and on the body's sides.
+    """
+    placed = [any(v is not None for v in c.where.values()) for c in (one, other)]
+    return one.effect == other.effect and placed == [False, True]
+
+
 def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Trial | None:
     wide = extended(problem, (candidate,))
     point = carried(wide, problem, evaluation.point)
@@ -216,5 +226,11 @@ def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: C
         [[mine.index(i) for i in group] for group in groups],
         [c.positive > 0 for c in candidates],
         [needed_gain(c, len(candidates)) for c in candidates],
+        [
+            (i, k)
+            for i, a in enumerate(candidates)
+            for k, b in enumerate(candidates)
+            if _alike_everywhere(a, b)
+        ],
     )
     return replace(choice, chosen=tuple(candidates[k] for k in kept))
