@@ -23,7 +23,8 @@ from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.rods import note_of, rods_of, with_rods
-from rig_identification.estimate.scan import scan
+from rig_identification.estimate.rolling import ways_of_rolling
+from rig_identification.estimate.scan import Scanned, scan
 from rig_identification.estimate.segments import (
     FreePart,
     free_part,
@@ -139,8 +140,7 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     problem = replace(found.problem, runs=problem.runs)
     progress("looking for the free part of each run", 0.2)
     half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
-    _, pieces, _ = solve_in_pieces(half, found.theta, found.rest, (found.rest,) * len(problem.rests))
-    theta = pieces.point.theta
+    theta = _rolling(half, found)
     parts = {run.recording.name: free_part(problem, run, theta, found.rest) for run in (*problem.runs, *held)}
     free = {name: with_noise_of_swing(part.run) for name, part in parts.items()}
     by_hand = tuple(stretch for name, part in parts.items() for stretch in _stretches(name, part))
@@ -151,6 +151,16 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     point = Point(theta, starts, (found.rest,) * len(problem.rests))
     held = tuple(free[run.recording.name] for run in held)
     return Start(problem, point, found.rest, held, notes, by_hand)
+
+
+def _rolling(half: Problem, found: Scanned) -> Array:
+    """The scan's vector fitted to short pieces, with the body rolling as it fits them best (rolling.py)."""
+    guesses = (found.rest,) * len(half.rests)
+    parts, best, _ = solve_in_pieces(half, found.theta, found.rest, guesses)
+    for theta in ways_of_rolling(parts, parts.runs, best.point.theta, found.rest):
+        _, other, _ = solve_in_pieces(half, theta, found.rest, guesses)
+        best = other if other.cost < best.cost else best
+    return best.point.theta
 
 
 def _stretches(name: str, part: FreePart) -> list[HeldPart]:

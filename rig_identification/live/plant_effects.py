@@ -74,9 +74,7 @@ class PlantEffects:
     hinge_damping: float = 0.0  # N m s/rad, each hinge
     hinge_friction: float = 0.0  # N m, each hinge
     hinge_bending: Array = field(default_factory=lambda: np.zeros(2))  # N m s/rad, at ceiling and body
-    held_ends: Array = field(
-        default_factory=lambda: np.zeros((1, 3))
-    )  # (n, 3) N m/rad: xx, xy, yy of upper ends
+    held_ends: Array = field(default_factory=lambda: np.zeros((1, 3)))  # N m/rad, xx xy yy, each cable or all
     air_drag: float = 0.0  # m^2, Cd A
     air_plates: Array = field(default_factory=lambda: np.zeros(2))  # m^2, Cd A of sides facing body x and y
     plate_reach: float = 0.5  # m
