@@ -55,13 +55,29 @@ def shared_information(information: Array, size: int) -> Array:
     return np.asarray(information[:size, :size] - cross @ np.linalg.solve(information[size:, size:], cross.T))
 
 
+#: Least information on a combination of parameters, in parts of what there is on each of them.
+LEAST = 1e-9
+
+
+def _lifted(information: Array) -> Array:
+    """Information in which rounding has left no combination with less than none."""
+    scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    scaled = (vectors * np.maximum(values, LEAST)) @ vectors.T
+    return np.asarray(scaled * np.outer(scale, scale))
+
+
 def _directions(fitted: Array, full: Linearised) -> tuple[Array, Array, Array]:
     """Of each generalised eigenvector u its l and u^T b, (p,) each, and the residual in the run's starts."""
     size = fitted.shape[0]
     columns, starts = full.jacobian[:, :size], full.jacobian[:, size:]
     basis = np.linalg.qr(starts)[0]
     columns = columns - basis @ (basis.T @ columns)
-    values, vectors = eigh(columns.T @ columns, fitted)
+    try:
+        values, vectors = eigh(columns.T @ columns, fitted)
+    except np.linalg.LinAlgError:
+        # A fit that is nowhere near knows some combinations to more digits than there are
+        values, vectors = eigh(columns.T @ columns, _lifted(fitted))
     return values, vectors.T @ (columns.T @ full.residual), basis.T @ full.residual
 
 

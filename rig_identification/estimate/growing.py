@@ -102,8 +102,8 @@ def solve_growing(
             tolerance=1e-3 if whole else 0.5,
             notify=None if notify is None else _at(notify, end, duration),
         )
-        if whole and hopeless and not converged and misfit(evaluation) < HOPELESS_SQUARE:
-            # It was the short horizon that was stuck, not the model that lacks something
+        if whole and not converged and misfit(evaluation) < HOPELESS_SQUARE:
+            # So near the noise it is steps that lack: along a flat valley, or a short horizon was stuck
             evaluation, converged = solve(
                 part, evaluation.point, iterations=STEPS, polish=POLISH, tolerance=1e-3
             )

@@ -32,7 +32,7 @@ from rig_identification.estimate.segments import (
     solve_in_pieces,
     with_noise_of_swing,
 )
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whole import fit_whole, predicted
@@ -266,6 +266,10 @@ UNSEEN_FORCE = (
 )
 
 
+#: Steps in which the fit of a body that is only watched is followed to its end, near the noise.
+FOLLOWED = 80
+
+
 def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
     """Fit the ideal model from where a session's fit starts, and predict the held-out runs."""
     evaluation, converged = solve_growing(
@@ -273,6 +277,9 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         start.point,
         notify=lambda fraction, text: progress(f"fit: {text}", 0.15 + 0.45 * fraction),
     )
+    if only_watched(start.problem) and misfit(evaluation) < NEAR_SQUARE:
+        # The valleys of a body that is only watched are curved: what a step wins says little of what is left
+        evaluation, converged = solve(start.problem, evaluation.point, iterations=FOLLOWED, tolerance=1e-3)
     progress("predicting held-out runs", 0.6)
     held_runs, held_out, lost = predicted(start.problem, start.held, evaluation.point.theta, start.rest)
     return Fitted(

@@ -312,15 +312,21 @@ AT_ROOT, LEAPS = 1.0, 3
 #: Gain (nats) that a full step may still promise where no step keeps it: the optimum is then within half a
 #: standard deviation.
 CLOSE = 0.125
+#: ... and out of steps, along a valley so flat that a step wins next to nothing: within one.
+NEARLY = 0.5
 
 
-def _as_good_as_settled(problem: Problem, current: Evaluation) -> bool:
-    """Whether a fit that gets nowhere any more is where it should be.
+def _as_good_as_settled(problem: Problem, current: Evaluation, close: float = CLOSE) -> bool:
+    """Whether a fit that gets nowhere any more is where it should be. close: nats.
 
     The residuals' spreads depend on the parameters as well, and that slope is not in the Jacobian: at
     the best point it and the residuals' own balance, and a full step promises a little for ever.
     """
-    return still_promised(problem, current) < CLOSE and not on_plateau(current)
+    try:
+        return still_promised(problem, current) < close and not on_plateau(current)
+    except np.linalg.LinAlgError:
+        # Nowhere near: some combinations are known to more digits than there are
+        return False
 
 
 def still_promised(problem: Problem, current: Evaluation) -> float:
@@ -379,7 +385,8 @@ def solve(
     Converged where the predicted gain of a full step falls below ``tolerance`` (nats): the
     estimate is then within sqrt(2 tolerance) of its own standard deviation from the optimum. Where
     a step won less than ``polish`` of what stays unexplained, the fit ends there as well: a
-    hypothesis that leaves much is not worth following down every valley. A step that does not pay is pulled
+    hypothesis that leaves much is not worth following down every valley. Out of steps it has converged
+    where a full step promises less than NEARLY. A step that does not pay is pulled
     back into its valley before it is damped, and the next ones are tried without derivatives first. Steps
     that win next to nothing, one after the other, end it too, unconverged: along bounds a valley may be
     followed for ever.
@@ -397,7 +404,7 @@ def solve(
         while True:
             damped.value = damping
             if spent > patience * iterations:
-                return current, _as_good_as_settled(problem, current)
+                return current, _as_good_as_settled(problem, current, NEARLY)
             # About as little damping failed last
             wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
@@ -434,7 +441,7 @@ def solve(
                 against += won < 0.0
                 creeping = creeping + 1 if won < CREEP else 0
                 if creeping == CREPT:
-                    return current, _as_good_as_settled(problem, current)
+                    return current, _as_good_as_settled(problem, current, NEARLY)
                 idle = idle + 1 if max(won, tolerance) < polish * excess(current) else 0
                 if idle and (damping <= 1e-3 or idle == IDLE):
                     return current, damping <= 1e-3 and not on_plateau(current)
@@ -451,7 +458,7 @@ def solve(
             notify(iteration, current.cost)
         if stop is not None and stop():
             break
-    return current, False
+    return current, _as_good_as_settled(problem, current, NEARLY)
 
 
 def _in_full(problem: Problem, point: Point, quick: Evaluation | None) -> Evaluation | None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit
 from rig_identification.estimate.identify import (
     Assumed,
     Ideal,
@@ -27,7 +28,7 @@ from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
-from rig_identification.mismatch.watched import explain_watched
+from rig_identification.mismatch.watched import Watched, explain_watched
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, Identification
 
@@ -78,6 +79,30 @@ def _without_unseen(found: Identification, rest: Identification, note: str) -> I
     return replace(rest, mismatch=mismatch, notes=(*rest.notes, note), figures=figures)
 
 
+def _watched(ideal: Ideal, notify: Progress) -> Watched | None:
+    """What damps a watched body; None where nothing does, or where no fit of it can be inverted."""
+    try:
+        return explain_watched(ideal, notify)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _answer_of(watched: Watched, session: Session, plain: Identification) -> Identification:
+    """The answer to a body that is only watched to swing. plain: the ideal model's."""
+    answer = compose(session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful)
+    lost = {*answer.total.unobservable, *watched.unobservable}
+    total = replace(answer.total, unobservable=tuple(name for name in ELEMENTS if name in lost))
+    answer = replace(answer, total=total, figures={**answer.figures, "ideal": plain})
+    if session.rig.frame is not None:
+        answer = replace(answer, without_frame=subtract_frame(total, session.rig.frame))
+    return answer
+
+
+def _worth_a_search(watched: Watched) -> bool:
+    """Whether what damps leaves so little, and yet something, that another hypothesis may explain it all."""
+    return watched.mismatch.verdict == "unexplained" and misfit(watched.fitted.evaluation) < HOPELESS_SQUARE
+
+
 def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> tuple[Identification, Fitted]:
     """The answer to a session, and the ideal model's fit."""
 
@@ -94,25 +119,22 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
     if not spells and not near_noise(fitted):
         ideal = with_pieces(ideal, fitting)
     plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+    swinging = None
     if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
         ideal = with_pieces(ideal, searching)
-        watched = explain_watched(ideal, searching)
+        watched = _watched(ideal, searching)
         if watched is not None:
-            answer = compose(
-                session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful
-            )
-            lost = {*answer.total.unobservable, *watched.unobservable}
-            total = replace(answer.total, unobservable=tuple(name for name in ELEMENTS if name in lost))
-            answer = replace(answer, total=total)
-            if session.rig.frame is not None:
-                answer = replace(answer, without_frame=subtract_frame(total, session.rig.frame))
-            return replace(answer, figures={**answer.figures, "ideal": plain}), fitted
+            swinging = _answer_of(watched, session, plain)
+            if not _worth_a_search(watched):
+                return swinging, fitted
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
             found = explain(ideal, spells, searching, budget)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
+    if swinging is not None and (found is None or not (found.told or found.mismatch.verdict == "none")):
+        return swinging, fitted
     if found is None:
         ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
