@@ -122,9 +122,16 @@ def testimony(
             std = share_left(heard, there) * believed_std(heard)
             size = natural_size(problem.bench.parameters.elements(theta))
             lost |= {name for name, s in zip(ELEMENTS, std / size, strict=True) if not s < GAIN}
-    # A product of inertia counts against the moments about its two axes: without them it tells nothing
-    lost |= {name for name in ELEMENTS if name[0] == "J" and {f"J{a}{a}" for a in name[1:]} & lost}
-    return tuple(name for name in ELEMENTS if name in lost)
+    return with_products(lost)
+
+
+def with_products(lost: set[str]) -> tuple[str, ...]:
+    """The elements of ``lost`` in their order, and each product of inertia with a moment among them.
+
+    A product counts against the moments about its two axes: without them it tells nothing.
+    """
+    idle = {name for name in ELEMENTS if name[0] == "J" and {f"J{a}{a}" for a in name[1:]} & lost}
+    return tuple(name for name in ELEMENTS if name in lost | idle)
 
 
 def natural_size(elements: Array) -> Array:

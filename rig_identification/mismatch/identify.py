@@ -21,6 +21,7 @@ from rig_identification.estimate.identify import (
     with_pieces,
     without_unseen_force,
 )
+from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.budget import Budget
@@ -30,7 +31,7 @@ from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.watched import Watched, explain_watched
 from rig_identification.recording import Session
-from rig_identification.result import ELEMENTS, Identification
+from rig_identification.result import Identification
 
 Progress = Callable[[str, float], None]
 
@@ -91,7 +92,7 @@ def _answer_of(watched: Watched, session: Session, plain: Identification) -> Ide
     """The answer to a body that is only watched to swing. plain: the ideal model's."""
     answer = compose(session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful)
     lost = {*answer.total.unobservable, *watched.unobservable}
-    total = replace(answer.total, unobservable=tuple(name for name in ELEMENTS if name in lost))
+    total = replace(answer.total, unobservable=with_products(lost))
     answer = replace(answer, total=total, figures={**answer.figures, "ideal": plain})
     if session.rig.frame is not None:
         answer = replace(answer, without_frame=subtract_frame(total, session.rig.frame))
