@@ -3,7 +3,7 @@
 By the project's own simulator: a check of the way from recordings to an answer, not of the model. Body, rig
 and doubts about it are drawn; two runs, the second held out. Each row is written as it is done.
 
-    python -m bench.pendulums [--seeds 2 3 4] [--kinds clean damping ...] [--threads 2]
+    python -m bench.pendulums --out FILE [--seeds 2 3 4] [--kinds clean damping ...] [--threads 2]
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from rig_identification.estimate.cautious import coherence, reweighted
 from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.rolling import ways_of_rolling
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import needed_gain
@@ -54,11 +54,16 @@ def _trial(problem: Problem, evaluation: Evaluation, candidate: Candidate) -> Tr
     if candidate.settle is not None:
         # From another body: the way to its best is longer
         point, steps = candidate.settle(wide, point, evaluation), 3 * STEPS
+    return _fitted(candidate, wide, point, steps)
+
+
+def _fitted(candidate: Candidate, problem: Problem, point: Point, steps: int) -> Trial | None:
+    """A hypothesis fitted from a point of its problem; None where it cannot be followed."""
     try:
-        fitted, _ = solve(wide, point, iterations=steps, tolerance=0.5)
+        fitted, _ = solve(problem, point, iterations=steps, tolerance=0.5)
     except FloatingPointError:
         return None
-    return finished(Trial(candidate, wide, fitted, log_evidence(fitted), True))
+    return finished(Trial(candidate, problem, fitted, log_evidence(fitted), True))
 
 
 def _rolling_otherwise(trial: Trial) -> Trial:
@@ -68,11 +73,7 @@ def _rolling_otherwise(trial: Trial) -> Trial:
     for theta in ways_of_rolling(problem, problem.runs, point.theta, point.starts[0]):
         starts = launch_states(problem.bench, problem.runs, theta, point.starts[0])
         start = replace(point, theta=theta, starts=starts)
-        try:
-            fitted, _ = solve(problem, start, iterations=2 * STEPS, tolerance=0.5)
-        except FloatingPointError:
-            continue
-        again = finished(Trial(trial.candidate, problem, fitted, log_evidence(fitted), True))
+        again = _fitted(trial.candidate, problem, start, 2 * STEPS)
         if again is not None and again.evidence > best.evidence:
             best = again
     return best

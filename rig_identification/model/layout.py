@@ -21,9 +21,7 @@ LENGTH = 6  # m
 AXIAL_STIFFNESS = 7  # EA, N
 AXIAL_DAMPING = 8  # time constant tau of Kelvin-Voigt damping, s
 CELL_AT_CEILING = 9  # 1: the load cell sits at the ceiling end; 0: at the body
-LEAN = (
-    10  # 3: N m/rad: xx, xy, yy of what its upper end holds the cable with as it leans (effects/held_ends.py)
-)
+LEAN = 10  # 3: N m/rad, xx, xy, yy: how its upper end holds the cable as it leans (effects/held_ends.py)
 
 # One internal coordinate (effects/internal.py); its block follows the effects' block
 KIND = 0  # constant: RIDER or CEILING
