@@ -47,6 +47,11 @@ def simulated(graph: Graph, *others: str) -> dict[str, subprocess.Popen[str]]:
     return processes | {name: graph.start(name) for name in others}
 
 
+def stamp(message: Imu) -> float:
+    """s, of its header, within a day."""
+    return float(message.header.stamp.sec % 100_000 + 1e-9 * message.header.stamp.nanosec)
+
+
 def has_taken_signals(process: subprocess.Popen[str]) -> bool:
     """Whether the process handles SIGTERM itself (its mask of caught signals)."""
     status = Path(f"/proc/{process.pid}/status").read_text()
@@ -171,6 +176,53 @@ def test_a_signal_while_fitting_ends_fit_and_node(graph: Graph, probe: Probe, nu
     (child,) = children.read_text().split()
     assert graph.end(identifier, number) == (0, "")
     assert not Path(f"/proc/{child}").exists()
+
+
+def test_a_recording_holds_what_was_sent_while_it_ran(graph: Graph, probe: Probe) -> None:
+    """A recorder and an identifier held up for seconds before the start, and again before the stop."""
+    simulated(graph)
+    folder, spool = graph.folder / "session", graph.folder / "windows"
+    nodes = {
+        "recorder": graph.start("recorder", f"folder:={folder}"),
+        "identifier": graph.start("identifier", f"spool:={spool}"),
+    }
+    services = {"recorder": ("start", "stop"), "identifier": ("start_window", "stop_window")}
+    diagnostics = Diagnostics(probe)
+    for node in nodes:
+        probe.meet(f"{node}/{services[node][1]}")
+        probe.spin_until(diagnostics.arrivals(node, 200, *SENSED), 120.0, f"the sensors at the {node}")
+    heard = probe.listen(Imu, "imu/data_raw")
+
+    def after(seconds: float) -> float:
+        """Stamp of a sample that was taken so many s from now."""
+        probe.spin_until(lambda: heard, 20.0, "the imu")
+        begun = stamp(heard[-1])
+        probe.spin_until(lambda: stamp(heard[-1]) > begun + seconds, 20.0 * seconds, "the imu")
+        return stamp(heard[-1])
+
+    bounds = []
+    for number in (0, 1):
+        for process in nodes.values():
+            process.send_signal(signal.SIGSTOP)
+        held = after(2.5)
+        futures = [probe.begin(f"{node}/{services[node][number]}") for node in nodes]
+        probe.spin_for(ACQUAINTED)
+        for process in nodes.values():
+            process.send_signal(signal.SIGCONT)
+        probe.spin_until(lambda futures=futures: all(f.done() for f in futures), 30.0, "the answers")
+        assert all(future.result().success for future in futures)
+        bounds.append((held, after(0.5)))
+        after(2.0)
+    for written in (folder, spool):
+        (run,) = read_session(written).recordings
+        begins = 1e-9 * run.start_ns % 100_000.0
+        assert bounds[0][0] <= begins <= bounds[0][1]
+        quality = {q.topic: q for q in run.quality}
+        for topic in SENSED:
+            found = quality[f"/rig/{topic}"]
+            assert found.missing == 0
+            assert found.start < 0.3  # s: a busy machine lets one sensor's samples wait
+            assert bounds[1][0] < begins + found.end < bounds[1][1]
 
 
 def test_a_sensor_killed_and_restarted_leaves_a_gap_with_a_name(graph: Graph, probe: Probe) -> None:

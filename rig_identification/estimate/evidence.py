@@ -46,6 +46,9 @@ WATCHED_NODE_STEP = 0.025
 MARGIN = 0.02
 #: Between two gaps of the force a shorter part (s) tells hardly more than its own start state.
 SHORTEST_PART = 1.0
+#: s of silence at a run's beginning that are cut off: a fit begins with less than twice as much of a run, and
+#: where nothing but the force is heard nothing tells its start state.
+UNHEARD = 0.2
 #: Node intervals either way of a jump of force from which samples are left out, and the share of a channel
 #: that must be left.
 BESIDE_JUMP, LEFT = 3.0, 0.5
@@ -145,13 +148,15 @@ class Run:
         return replace(self, grid=grid, channels=tuple(cut), force=force, offset=offset, unknown=())
 
     def where_driven(self) -> tuple[Run, ...]:
-        """The run's parts between stretches in which its force is not known."""
-        if not self.unknown:
+        """The run's parts between stretches in which its force is not known, from its first reading on."""
+        heard = min((float(c.time[0]) for c in self.channels), default=0.0)
+        begins = heard if heard > UNHEARD else 0.0
+        if not (self.unknown or begins):
             return (self,)
         edges = [0.0, *(edge for stretch in self.unknown for edge in stretch), self.grid.duration]
         parts = []
         for start, end in zip(edges[::2], edges[1::2], strict=True):
-            first, last = int(np.ceil(start / self.grid.step)), int(end / self.grid.step)
+            first, last = int(np.ceil(max(start, begins) / self.grid.step)), int(end / self.grid.step)
             if (last - first) * self.grid.step > SHORTEST_PART:
                 parts.append(self.between(first, last, margin=MARGIN))
         return tuple(parts)

@@ -12,10 +12,10 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped
 from std_msgs.msg import Float64MultiArray, String
-from std_srvs.srv import Trigger
 
 from rig_identification.errors import InputError
-from rig_identification.nodes.deferred import Later, serve_later
+from rig_identification.nodes.bag_keeper import BagKeeper
+from rig_identification.nodes.deferred import Later
 from rig_identification.nodes.fit_process import FitProcess
 from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.parameters import OwnParameter, one_of, within
@@ -23,7 +23,7 @@ from rig_identification.nodes.recording_parameters import RECORDING, planned
 from rig_identification.nodes.result_messages import inertia_message, matrix_message, mismatch_message
 from rig_identification.nodes.rig_node import ERROR, LATCHED, OK, RigNode, diagnostic
 from rig_identification.nodes.running import RunningEstimator
-from rig_identification.nodes.session_folder import DiskFull, SessionFolder
+from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
 from rig_identification.session.session_description import read_session_description
 from rig_identification.session.topics import expected_topics
@@ -81,13 +81,13 @@ class IdentifierNode(RigNode):
         self.latest: dict[str, Any] | None = None  # answer of the latest fit that went well
         self._basis: tuple[str, ...] = ()
         self._runs = 0
-        self._trouble = ""
+        self.keeper = BagKeeper(self, self.windows, self.intake)
         self._offer()
         self.every(self.own.number("period"), self._work)
 
     def _offer(self) -> None:
         for name in ("identify_center_of_mass", "identify_inertia", "explain_mismatch"):
-            serve_later(self, f"~/{name}", lambda name=name: self._begin(name))  # type: ignore[misc]
+            self.serve(f"~/{name}", lambda name=name: self._begin(name))  # type: ignore[misc]
         for name in ("get_center_of_mass", "get_inertia"):
             self.serve(f"~/{name}", lambda name=name: self._latest(name))  # type: ignore[misc]
         self.serve("~/start_window", self._start_window)
@@ -103,25 +103,29 @@ class IdentifierNode(RigNode):
     # Windows
 
     def _start_window(self) -> str:
-        self.intake.take()  # what came before does not belong to it
         plan = planned(self.own, {done.name for done in self.windows.done})
-        self.windows.start(plan)
-        self._trouble = ""
+        self.keeper.start(plan)
         self.running.listen(plan.kind == "dynamic")
         return f"window {plan.name} ({plan.kind}) is open"
 
-    def _stop_window(self) -> str:
+    def _stop_window(self) -> Later:
         self._work()
         plan = self.windows.plan
         if plan is None:
-            raise InputError(self._trouble or "no window is open; call ~/start_window first")
-        counts = dict(self.windows.counts)
+            raise InputError(self.keeper.trouble or "no window is open; call ~/start_window first")
+        if self.keeper.ending:
+            raise InputError(f"window {plan.name} waits for its last messages already")
         self.running.listen(False)
-        if self.windows.stop() is None:
-            raise InputError(f"window {plan.name}: no message came on any topic; nothing was kept")
-        missing = [name for name in self._expected() if not counts.get(name)]
-        silent = f"; silent: {', '.join(missing)}" if missing else ""
-        return f"window {plan.name}: {sum(counts.values())} messages on {len(counts)} topics{silent}"
+
+        def answer(done: RecordingPlan | None, counts: dict[str, int]) -> str:
+            if done is None:
+                nothing = f"window {plan.name}: no message came on any topic; nothing was kept"
+                raise InputError(self.keeper.trouble or nothing)
+            missing = [name for name in self._expected() if not counts.get(name)]
+            silent = f"; silent: {', '.join(missing)}" if missing else ""
+            return f"window {plan.name}: {sum(counts.values())} messages on {len(counts)} topics{silent}"
+
+        return self.keeper.stop(answer)
 
     def _expected(self) -> list[str]:
         """Topics that a window should hold: every cable's, and what came at any time."""
@@ -140,15 +144,8 @@ class IdentifierNode(RigNode):
 
     # Requests
 
-    def _begin(self, name: str) -> Later | Trigger.Response:
-        later = Later()
-        success, message = self.outcome(lambda: self._start_fit(name, later))
-        if success and not message:
-            return later
-        return Trigger.Response(success=success, message=message)
-
-    def _start_fit(self, name: str, later: Later) -> str:
-        """Empty: the fit runs; else the answer."""
+    def _begin(self, name: str) -> str | Later:
+        """The answer, or that it comes with the fit that begins."""
         if self.request is not None:
             r = self.request
             done = f"{100.0 * r.process.fraction:.0f} % done ({r.process.stage})"
@@ -157,8 +154,9 @@ class IdentifierNode(RigNode):
         if self.latest is not None and basis == self._basis:
             return self._answer(name)  # the same data give the same result
         self._runs += 1
+        later = Later()
         self.request = Request(self._runs, name, later, FitProcess(session), basis)
-        return ""
+        return later
 
     def _chosen(self) -> tuple[Path, tuple[str, ...]]:
         """Session file to fit and what it rests on. Raises InputError."""
@@ -173,7 +171,7 @@ class IdentifierNode(RigNode):
             if not self.windows.done:
                 open_one = self.windows.plan
                 told = (
-                    f"window {open_one.name} is still open; call ~/stop_window"
+                    f"window {open_one.name} is still open; call ~/stop_window and wait for its answer"
                     if open_one
                     else "call ~/start_window"
                 )
@@ -222,11 +220,8 @@ class IdentifierNode(RigNode):
     def _work(self) -> None:
         for batch in self.intake.take():
             self.running.add(batch)
-            try:
-                self.windows.add(batch.topic.name, batch.messages, batch.arrival_ns.tolist())
-            except DiskFull as error:
-                self._trouble = str(error)
-                self.get_logger().error(self._trouble)
+            self.keeper.write(batch)
+        self.keeper.look()
         if self.request is not None:
             self._watch(self.request)
 
@@ -262,7 +257,8 @@ class IdentifierNode(RigNode):
         if request is not None:
             message += f"; {request.name}, run {request.run}: {request.process.stage}"
         line = diagnostic(
-            f"{self.get_name()}: windows", ERROR if self._trouble else OK, self._trouble or message,
+            f"{self.get_name()}: windows", ERROR if self.keeper.trouble else OK,
+            self.keeper.trouble or message,
             messages=sum(self.windows.counts.values()), done=[done.name for done in self.windows.done],
         )  # fmt: skip
         return [*super().status(), line, *stream_status(self, self.intake)]
@@ -272,7 +268,7 @@ class IdentifierNode(RigNode):
         if self.request is not None:
             self.request.process.end()
         self._work_quietly()
-        self.windows.stop()
+        self.keeper.close()
         if self._temporary:
             shutil.rmtree(self.windows.folder, ignore_errors=True)
 

@@ -1,23 +1,25 @@
-"""Raw subscriptions: serialized messages are gathered as they arrive and taken in batches.
+"""Raw subscriptions: serialized messages wait in the middleware and are taken in batches.
 
 A Python callback that touches a message's fields costs more than the time between two of them
-at 7000 a second; gathering bytes does not.
+at 7000 a second; taking bytes does not. Taken by hand they come with the middleware's own stamps, which
+the events executor of rclpy 7.1 cannot pass on (a callback for message and info raises SystemError).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.clock import ROSClock
-from rclpy.node import Node
 
 from rig_identification.errors import InputError
+from rig_identification.live.sending_clock import SendingClock
 from rig_identification.live.stamp_gate import StampGate
-from rig_identification.nodes.rig_node import reliable
+from rig_identification.nodes.by_hand import Taken
+from rig_identification.nodes.rig_node import RigNode, reliable
 from rig_identification.nodes.wire import TYPES, channel_values, decode_batch
 from rig_identification.session.clipping import clipped_samples
 from rig_identification.session.topics import Topic
@@ -37,6 +39,7 @@ class Batch:
     topic: Topic
     messages: list[bytes]  # all, as received
     arrival_ns: Stamps  # (n,) node clock
+    sent_ns: Stamps  # (n,) this machine's clock
     stamp_ns: Stamps  # (k,) of the believable samples
     values: Array  # (k, w) finite where the sensor measured
 
@@ -49,16 +52,18 @@ class Intake:
 
     Parameters
     ----------
-    node : Node
+    node : RigNode
     topics : mapping
         Name of the topic to what it carries.
     depth : int
-        Messages that the middleware keeps for each topic: a second's worth.
+        Messages that the middleware keeps for each topic until they are taken: a second's worth.
     watch_range : bool
         Keep samples for :meth:`look_for_clipping`, which must then be called each second.
     """
 
-    def __init__(self, node: Node, topics: dict[str, Topic], depth: int, watch_range: bool = False) -> None:
+    def __init__(
+        self, node: RigNode, topics: dict[str, Topic], depth: int, watch_range: bool = False
+    ) -> None:
         self.topics = topics
         self.gates = {name: StampGate() for name in topics}
         self.not_finite = dict.fromkeys(topics, 0)
@@ -69,21 +74,13 @@ class Intake:
         self._recent: dict[str, list[Array]] = {name: [] for name in topics}
         self.last_arrival = dict.fromkeys(topics, 0.0)  # s, steady clock
         self._node, self._watch_range = node, watch_range
-        self._waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in topics}
+        self._sending = {name: SendingClock() for name in topics}
         # With simulated time, arrivals are taken on that clock: stamps of a fast replay outrun the wall's
         self._simulated = bool(node.get_parameter("use_sim_time").value)
-        for name, topic in topics.items():
-            node.create_subscription(
-                TYPES[topic.message_type], name, self._gather(name), reliable(depth), raw=True
-            )
-
-    def _gather(self, name: str) -> Callable[[bytes], None]:
-        waiting, now = self._waiting, self.now_ns
-
-        def gather(message: bytes) -> None:
-            waiting[name].append((now(), message))
-
-        return gather
+        self._subscriptions = {
+            name: node.subscribe_by_hand(TYPES[topic.message_type], name, reliable(depth))
+            for name, topic in topics.items()
+        }
 
     def now_ns(self) -> int:
         """The clock on which arrivals are taken."""
@@ -97,22 +94,24 @@ class Intake:
         """Everything that arrived since the last call on ``names`` (None: all); no news, no batch."""
         batches = []
         for name in self.topics if names is None else names:
-            arrived, self._waiting[name] = self._waiting[name], []
+            arrived = self._subscriptions[name].take()
             if arrived:
                 self.last_arrival[name] = time.monotonic()
                 batches.append(self._batch(name, arrived))
         return batches
 
-    def _batch(self, name: str, arrived: list[tuple[int, bytes]]) -> Batch:
+    def _batch(self, name: str, arrived: list[Taken]) -> Batch:
         topic = self.topics[name]
-        arrival = np.array([stamp for stamp, _ in arrived], np.int64)
-        messages = [message for _, message in arrived]
+        source, received = np.array([(one.source_ns, one.received_ns) for one in arrived], np.int64).T
+        sent = self._sending[name].times(source, received)
+        arrival = np.full(len(arrived), self.now_ns()) if self._simulated else received
+        messages = [one.message for one in arrived]
         try:
             stamps, decoded = decode_batch(name, topic.message_type, messages)
         except InputError:
             self.garbled[name] += len(messages)
             stamps, decoded = np.zeros(0, np.int64), np.zeros((0, 6))
-            return Batch(topic, messages, arrival, stamps, channel_values(topic, decoded))
+            return Batch(topic, messages, arrival, sent, stamps, channel_values(topic, decoded))
         admitted = self.gates[name].admit(stamps, arrival)
         values = channel_values(topic, decoded)
         finite = np.isfinite(values).all(axis=1)
@@ -120,7 +119,7 @@ class Intake:
         used = admitted & finite
         if self._watch_range and topic.channel in CAN_CLIP:
             self._recent[name].append(values[used])
-        return Batch(topic, messages, arrival, stamps[used], values[used])
+        return Batch(topic, messages, arrival, sent, stamps[used], values[used])
 
     def look_for_clipping(self) -> None:
         """Count the clipped samples since the last call; called each second."""

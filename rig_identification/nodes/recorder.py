@@ -7,11 +7,13 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from rig_identification.errors import InputError
+from rig_identification.nodes.bag_keeper import BagKeeper
+from rig_identification.nodes.deferred import Later
 from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.parameters import OwnParameter, one_of, within
 from rig_identification.nodes.recording_parameters import RECORDING, planned
 from rig_identification.nodes.rig_node import ERROR, OK, RigNode, diagnostic
-from rig_identification.nodes.session_folder import DiskFull, SessionFolder
+from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
 from rig_identification.session.topics import expected_topics
 
@@ -26,7 +28,7 @@ PARAMETERS = (
 
 
 class RecorderNode(RigNode):
-    """Writes what arrives, as it arrived."""
+    """Writes what is sent while it records, as it arrived."""
 
     def __init__(self) -> None:
         super().__init__("recorder", PARAMETERS)
@@ -37,7 +39,7 @@ class RecorderNode(RigNode):
         topics = expected_topics(tuple(cable.name for cable in rig.cables), self.get_namespace())
         self.session = SessionFolder(folder, rig, topics, self.own.text("storage"))
         self.intake = Intake(self, topics, self.own.whole("depth"), watch_range=True)
-        self._trouble = ""
+        self.keeper = BagKeeper(self, self.session, self.intake)
         self.serve("~/start", self._start)
         self.serve("~/stop", self._stop)
         self.every(self.own.number("period"), self._work)
@@ -45,38 +47,39 @@ class RecorderNode(RigNode):
             self._start()
 
     def _start(self) -> str:
-        self.intake.take()  # what came before does not belong to it
         plan = planned(self.own, {done.name for done in self.session.done})
-        self.session.start(plan)
-        self._trouble = ""
+        self.keeper.start(plan)
         return f"recording {plan.name} ({plan.kind}) in {self.session.folder}"
 
-    def _stop(self) -> str:
-        if self.session.plan is None:
-            raise InputError(self._trouble or "nothing is being recorded; call ~/start first")
+    def _stop(self) -> Later:
         self._work()
-        name = self.session.plan.name if self.session.plan is not None else ""
-        counts = dict(self.session.counts)
-        if self.session.stop() is None:
-            raise InputError(
-                self._trouble or f"recording {name}: no message came on any topic; nothing was written"
-            )
-        return f"{name}: {sum(counts.values())} messages on {len(counts)} topics in {self.session.folder}"
+        plan, trouble = self.session.plan, self.keeper.trouble
+        if plan is None:
+            raise InputError(trouble or "nothing is being recorded; call ~/start first")
+        if self.keeper.ending:
+            raise InputError(f"recording {plan.name} waits for its last messages already")
+
+        def answer(done: RecordingPlan | None, counts: dict[str, int]) -> str:
+            if done is None:
+                nothing = f"recording {plan.name}: no message came on any topic; nothing was written"
+                raise InputError(self.keeper.trouble or nothing)
+            told = f"{sum(counts.values())} messages on {len(counts)} topics in {self.session.folder}"
+            return f"{plan.name}: {told}"
+
+        return self.keeper.stop(answer)
 
     def _work(self) -> None:
         for batch in self.intake.take():
-            try:
-                self.session.add(batch.topic.name, batch.messages, batch.arrival_ns.tolist())
-            except DiskFull as error:
-                self._trouble = str(error)
-                self.get_logger().error(self._trouble)
+            self.keeper.write(batch)
+        self.keeper.look()
 
     def status(self) -> list[DiagnosticStatus]:
         """What is being recorded, and every topic."""
         plan = self.session.plan
         message = f"recording {plan.name}" if plan else "not recording"
         line = diagnostic(
-            f"{self.get_name()}: recording", ERROR if self._trouble else OK, self._trouble or message,
+            f"{self.get_name()}: recording", ERROR if self.keeper.trouble else OK,
+            self.keeper.trouble or message,
             messages=sum(self.session.counts.values()), done=[done.name for done in self.session.done],
         )  # fmt: skip
         return [*super().status(), line, *stream_status(self, self.intake)]
@@ -84,7 +87,7 @@ class RecorderNode(RigNode):
     def close(self) -> None:
         """Finish the open bag."""
         self._work()
-        self.session.stop()
+        self.keeper.close()
 
 
 def create() -> RecorderNode:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
 from rig_identification.errors import RigIdentificationError
-from rig_identification.nodes.deferred import serve_later
+from rig_identification.nodes.by_hand import ByHand
+from rig_identification.nodes.deferred import Later, serve_later
 from rig_identification.nodes.parameters import OwnParameter, OwnParameters
 from rig_identification.nodes.rig_parameters import refuse_misspelt, rig_of
 from rig_identification.rig import Rig
@@ -30,10 +32,15 @@ def reliable(depth: int) -> QoSProfile:
     return QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
 
 
+def _ignore(message: bytes) -> None:
+    """No executor hands this a message."""
+
+
 class RigNode(Node):
     """A node that outlives its callbacks' errors and says so on ``/diagnostics``."""
 
     def __init__(self, name: str, parameters: Sequence[OwnParameter]) -> None:
+        self._by_hand: list[ByHand] = []
         super().__init__(
             name,
             namespace=None,
@@ -48,6 +55,18 @@ class RigNode(Node):
         self.last_fault = ""
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.every(1.0, self._diagnose)
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Those that an executor serves."""
+        apart = {id(one.subscription) for one in self._by_hand}
+        yield from (one for one in super().subscriptions if id(one) not in apart)
+
+    def subscribe_by_hand(self, kind: type, topic: str, qos: QoSProfile) -> ByHand:
+        """A raw subscription whose messages wait until they are taken."""
+        made = ByHand(self.create_subscription(kind, topic, _ignore, qos, raw=True))
+        self._by_hand.append(made)
+        return made
 
     def rig(self) -> Rig:
         """The rig that the parameters describe. Raises InputError."""
@@ -77,17 +96,21 @@ class RigNode(Node):
             self.get_logger().error(f"{message}\n{details}".rstrip())
         self.last_fault = message
 
-    def serve(self, name: str, answer: Callable[[], str], group: CallbackGroup | None = None) -> None:
-        """Offer a Trigger service; ``answer`` returns the message, or raises what the caller is told."""
+    def serve(self, name: str, answer: Callable[[], str | Later], group: CallbackGroup | None = None) -> None:
+        """Offer a Trigger service; ``answer`` returns the message or what it will come by, or raises what
+        the caller is told.
+        """
 
-        def call() -> Trigger.Response:
+        def call() -> Later | Trigger.Response:
             success, message = self.outcome(answer)
-            return Trigger.Response(success=success, message=message)
+            return (
+                message if isinstance(message, Later) else Trigger.Response(success=success, message=message)
+            )
 
         serve_later(self, name, call, group)
 
-    def outcome(self, answer: Callable[[], str]) -> tuple[bool, str]:
-        """(success, message) of a request."""
+    def outcome(self, answer: Callable[[], str | Later]) -> tuple[bool, str | Later]:
+        """(success, message or what it will come by) of a request."""
         try:
             return True, answer()
         except RigIdentificationError as error:
