@@ -35,6 +35,22 @@ def without(series: Series, start: float, end: float) -> Series:
     return Series(series.time[keep], series.values[keep])
 
 
+def begun_late(recording: Recording, start: float) -> Recording:
+    """A recording of which only the exciter's force is known before ``start`` s."""
+
+    def late(series: Series | None) -> Series | None:
+        return series and Series(series.time[series.time >= start], series.values[series.time >= start])
+
+    tension = {name: late(series) for name, series in recording.tension.items()}
+    return replace(
+        recording,
+        tension=tension,
+        imu=late(recording.imu),
+        inclination=late(recording.inclination),
+        mocap=late(recording.mocap),
+    )
+
+
 def test_a_force_without_gaps_is_left_alone() -> None:
     time, values = turning(500.0)
     known = bridged(GRID, time, values, NOISE)
@@ -88,6 +104,21 @@ def test_a_run_begins_anew_behind_a_gap() -> None:
     assert all(part.grid.duration > SHORTEST_PART for part in scraps.where_driven())
 
 
+def test_a_run_begins_where_something_but_the_force_is_heard() -> None:
+    """A logger started 2 s after the exciter's: of the body nothing is known before."""
+    whole = make_recording(seconds=8.0)
+
+    silent = begun_late(whole, 2.0)
+    (run,) = prepare(make_rig(), silent).where_driven()
+    np.testing.assert_allclose([run.offset, run.grid.duration], [2.0, whole.duration - 2.0], atol=0.03)
+    assert run.force is not None
+    assert run.force.values.shape[0] == run.grid.nodes
+    assert min(c.time[0] for c in run.channels) < 0.05
+    holed = replace(silent, exciter_force=without(whole.exciter_force, 1.0, 3.0))  # type: ignore[arg-type]
+    (run,) = prepare(make_rig(), holed).where_driven()
+    assert run.offset == pytest.approx(3.0, abs=0.02)
+
+
 @pytest.fixture(scope="module")
 def driven() -> tuple[Session, np.ndarray]:
     session, truth = recorded(thesis_case_14(), seed=11, duration=8.0)
@@ -110,6 +141,20 @@ def test_a_gap_in_the_force_leaves_a_session_explained(
 ) -> None:
     session, truth = driven
     fitted = fit_session(changed(session, start, end))
+    assert judged(fitted)[1].verdict == "none"
+    total = inertial_estimate(fitted.problem, fitted.evaluation)
+    z = (total.values - truth) / np.sqrt(np.diag(total.covariance))
+    seen = [i for i, name in enumerate(ELEMENTS) if name not in total.unobservable]
+    assert np.max(np.abs(z[seen])) < 3.5
+
+
+def test_a_session_whose_devices_begin_after_the_force_is_explained(
+    driven: tuple[Session, np.ndarray],
+) -> None:
+    """Fits begin with short stretches of a run: one in which nothing is heard made the equations singular."""
+    session, truth = driven
+    late = [r if r.kind == "static" else begun_late(r, 3.0) for r in session.recordings]
+    fitted = fit_session(replace(session, recordings=tuple(late)))
     assert judged(fitted)[1].verdict == "none"
     total = inertial_estimate(fitted.problem, fitted.evaluation)
     z = (total.values - truth) / np.sqrt(np.diag(total.covariance))

@@ -43,8 +43,8 @@ PARAMETERS = (
 )
 #: Wall seconds between two looks at what is due, and messages sent at a look at most.
 TICK, AT_ONCE = 0.002, 400
-#: s for the last messages to arrive before an operated node is told to stop.
-SETTLE = 1.0
+#: s between the last message and an operated node's stop: it waits itself for what was sent before.
+SETTLE = 0.1
 #: s that listeners of a recording that another node is told of get to be found.
 DISCOVERY = 20.0
 #: Services that an identifier and a recorder offer.

@@ -123,7 +123,9 @@ class RigSimulator(RigNode):
     def _come_to_rest(self) -> str:
         mass = self.own.number("dummy.mass")
         self.plant.come_to_rest(Dummy(mass, self.own.vector("dummy.position", 3)) if mass > 0.0 else None)
-        return f"at rest with a dummy of {mass:g} kg" if mass > 0.0 else "at rest"
+        # Samples on their way to a listener are from before: their stamps tell
+        since = f"from stamp {self.plant.now_ns / 1e9:.6f} on"
+        return f"at rest with a dummy of {mass:g} kg {since}" if mass > 0.0 else f"at rest {since}"
 
     def _tick(self) -> None:
         behind = self.own.number("speed") * (time.monotonic() - self._begun) - 0.001 * self.plant.nodes
