@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.symmetry import turns
 from rig_identification.model import sensors
 from rig_identification.model.equilibrium import design_pose, find_rest, settle
 from rig_identification.model.motion import RigModel, State, on_cables, rig_model
@@ -97,13 +98,16 @@ def headings(rig: Rig, run: Run) -> list[float]:
     A body on two cables tilts about the line e of its hinges as it swings across it: the
     horizontal rotation follows the displacement as r = e (n . d)/h, n = z x e, so that e is the
     left singular vector of the regression of r on d. Its sign stays open: a body on two cables swings
-    alike turned by half a circle, and the smaller turn comes first. Otherwise a round of eight.
+    alike turned by half a circle, and the smaller turn comes first. Otherwise eight of a round, or of that
+    part of it after which the rig falls on itself (symmetry.py), about no turn.
     """
     if rig.mocap is not None:
         return [0.0]
     channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
     if len(rig.cables) > 2 or run.R_tracker_mean is None or len(channels) < 2:
-        return [float(a) for a in np.arange(8) * np.pi / 4]
+        seen = all(c.device == "mocap" for c in run.channels)
+        part = 2.0 * np.pi / (1 + len([turn for turn in turns(rig) if turn.exact])) if seen else 2.0 * np.pi
+        return sorted((part * (k / 8.0) for k in range(-3, 5)), key=abs)
     place, turn = channels["position"], channels["orientation"]
     # Rotation in tracker axes: the mean orientation carries the vector about it there
     r = (turn.values @ run.R_tracker_mean.T)[:, :2]

@@ -18,7 +18,7 @@ from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
-from rig_identification.estimate.observability import inertial_estimate
+from rig_identification.estimate.observability import inertial_estimate, unsettled
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.rest_evidence import prepare_rest
@@ -32,9 +32,10 @@ from rig_identification.estimate.segments import (
     solve_in_pieces,
     with_noise_of_swing,
 )
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.solve import Evaluation, Point, Problem, as_good_as_settled, evaluate, solve
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
+from rig_identification.estimate.whichever_way import whichever_way
 from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import RigModel, State, rig_model
@@ -268,6 +269,9 @@ UNSEEN_FORCE = (
 
 #: Steps in which the fit of a body that is only watched is followed to its end, near the noise.
 FOLLOWED = 80
+#: Nats that a full step may promise where such a fit ends: of no weight to whether the model explains the
+#: recordings, and the step goes into the body's interval.
+LEFT = 2.0
 
 
 def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
@@ -280,6 +284,7 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
     if only_watched(start.problem) and misfit(evaluation) < NEAR_SQUARE:
         # The valleys of a body that is only watched are curved: what a step wins says little of what is left
         evaluation, converged = solve(start.problem, evaluation.point, iterations=FOLLOWED, tolerance=1e-3)
+        converged = converged or as_good_as_settled(start.problem, evaluation, LEFT)
     progress("predicting held-out runs", 0.6)
     held_runs, held_out, lost = predicted(start.problem, start.held, evaluation.point.theta, start.rest)
     return Fitted(
@@ -429,13 +434,19 @@ def compose(
     """
     if careful is not None:
         loose *= coherence(*careful)
-    total = inertial_estimate(*(careful or (fitted.problem, fitted.evaluation)))
-    alone = replace(total, covariance=loose * total.covariance)
+    basis = careful or (fitted.problem, fitted.evaluation)
+    total = inertial_estimate(*basis)
+    covariance = loose * total.covariance
+    if careful is None and fitted.converged:
+        covariance = covariance + unsettled(*basis)
+    alone = replace(total, covariance=covariance)
     total = mixture(alone, rivals)
     wider = np.sqrt(np.diag(total.covariance) / np.diag(alone.covariance))
     notes = fitted.notes + ((CAUTION,) if careful else ())
     if float(np.max(wider)) > WIDER:
         notes += (TIED,)
+    total, headings = whichever_way(*basis, total)
+    notes += (headings,) if headings else ()
     frame = session.rig.frame
     return Identification(
         total=total,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, left_to_go
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
@@ -32,6 +32,13 @@ def elements_covariance(problem: Problem, evaluation: Evaluation) -> Array:
     covariance = invert_information(evaluation.information)[:10, :10]
     map_ = problem.bench.parameters.elements_jacobian(evaluation.point.theta)
     return np.asarray(map_ @ covariance @ map_.T)
+
+
+def unsettled(problem: Problem, evaluation: Evaluation) -> Array:
+    """(10, 10) what the step that a fit has still to go adds to the covariance of the ten elements."""
+    map_ = problem.bench.parameters.elements_jacobian(evaluation.point.theta)
+    step = map_ @ left_to_go(problem, evaluation)[:10]
+    return np.outer(step, step)
 
 
 def invert_information(information: Array) -> Array:

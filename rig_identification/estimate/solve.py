@@ -316,7 +316,7 @@ CLOSE = 0.125
 NEARLY = 0.5
 
 
-def _as_good_as_settled(problem: Problem, current: Evaluation, close: float = CLOSE) -> bool:
+def as_good_as_settled(problem: Problem, current: Evaluation, close: float = CLOSE) -> bool:
     """Whether a fit that gets nowhere any more is where it should be. close: nats.
 
     The residuals' spreads depend on the parameters as well, and that slope is not in the Jacobian: at
@@ -331,7 +331,12 @@ def _as_good_as_settled(problem: Problem, current: Evaluation, close: float = CL
 
 def still_promised(problem: Problem, current: Evaluation) -> float:
     """Gain (nats) that a full step would bring to second order."""
-    return _promised(current, _bounded_step(problem, current, 0.0))
+    return _promised(current, left_to_go(problem, current))
+
+
+def left_to_go(problem: Problem, current: Evaluation) -> Array:
+    """The full step, of every unknown, from where a fit ended."""
+    return _bounded_step(problem, current, 0.0)
 
 
 def _promised(current: Evaluation, change: Array) -> float:
@@ -404,7 +409,7 @@ def solve(
         while True:
             damped.value = damping
             if spent > patience * iterations:
-                return current, _as_good_as_settled(problem, current, NEARLY)
+                return current, as_good_as_settled(problem, current, NEARLY)
             # About as little damping failed last
             wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
@@ -414,7 +419,7 @@ def solve(
                 return current, not on_plateau(current)
             if damping > 1e-3 and gain < polish * excess(current):
                 # Held back so much, no step can win what would be worth it
-                return current, _as_good_as_settled(problem, current)
+                return current, as_good_as_settled(problem, current)
             moved, allowed = _moved(problem, current, change), current.cost + ROUNDING * abs(current.cost)
             if damping <= 1e-3 and gain < AT_ROOT and against < LEAPS:
                 allowed += gain
@@ -441,7 +446,7 @@ def solve(
                 against += won < 0.0
                 creeping = creeping + 1 if won < CREEP else 0
                 if creeping == CREPT:
-                    return current, _as_good_as_settled(problem, current, NEARLY)
+                    return current, as_good_as_settled(problem, current, NEARLY)
                 idle = idle + 1 if max(won, tolerance) < polish * excess(current) else 0
                 if idle and (damping <= 1e-3 or idle == IDLE):
                     return current, damping <= 1e-3 and not on_plateau(current)
@@ -451,14 +456,14 @@ def solve(
             failed, turned_back = max(failed, damping), True
             damping = max(damping, 1e-6) * BRAKED
             if damping > 1e6:
-                return current, _as_good_as_settled(problem, current)
+                return current, as_good_as_settled(problem, current)
             if stop is not None and stop():
                 return current, False
         if notify is not None:
             notify(iteration, current.cost)
         if stop is not None and stop():
             break
-    return current, _as_good_as_settled(problem, current, NEARLY)
+    return current, as_good_as_settled(problem, current, NEARLY)
 
 
 def _in_full(problem: Problem, point: Point, quick: Evaluation | None) -> Evaluation | None:
