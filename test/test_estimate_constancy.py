@@ -76,3 +76,15 @@ def test_a_held_out_run_is_as_likely_as_what_the_fit_leaves_open_makes_it() -> N
         both.append((log_predictive(shared, run), density.logpdf(unseen @ run.residual)))
     (told, exact), (other, exact_other) = both
     assert told - other == pytest.approx(exact - exact_other, rel=1e-6)
+
+
+def test_a_start_that_leaves_no_trace_takes_nothing_away() -> None:
+    """Dry hinges stop a body wherever it starts: the equations of its start are singular."""
+    rng = np.random.default_rng(3)
+    columns = rng.normal(size=(40, PARAMETERS + 2))
+    information = columns.T @ columns
+    traceless = np.zeros((PARAMETERS + 3, PARAMETERS + 3))
+    traceless[: PARAMETERS + 2, : PARAMETERS + 2] = information
+    np.testing.assert_allclose(
+        shared_information(traceless, PARAMETERS), shared_information(information, PARAMETERS), rtol=1e-9
+    )

@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import curve_fit
 from scipy.spatial.transform import Rotation
 
+from bench.pendulums import drawn
 from rig_identification.estimate.rolling import depth_of
 from rig_identification.mismatch.identify import identify
 from rig_identification.model.equilibrium import design_pose, settle
@@ -300,6 +301,22 @@ def test_an_upper_end_that_holds_its_cable_is_found(held: tuple[Identification, 
     assert answer.holdout_error == pytest.approx(1.0, abs=0.1)
     zz = ELEMENTS.index("Jzz")
     assert abs(answer.total.values[zz] - truth[zz]) <= 3.0 * np.sqrt(answer.total.covariance[zz, zz])
+
+
+@pytest.mark.long
+def test_dry_hinges_that_stop_a_pendulum_are_found() -> None:
+    """Beside a body fitted to roll at another frequency their moment was bent to next to nothing."""
+    spec, truth = drawn("friction", 3, 2)
+    answer = identify(simulate_session(spec, np.random.default_rng(3))[0])
+    assert answer.mismatch.verdict == "explained"
+    rubbing = next(f for f in answer.mismatch.findings if f.effect == "hinge_friction")
+    told = rubbing.parameters["torque"]
+    assert abs(told["value"] - spec.effects["hinge_friction"][0]) < 3.5 * told["std"]  # type: ignore[operator]
+    assert not [f for f in answer.mismatch.findings if f.effect in ("hinge_damping", "air_drag")]
+    assert answer.holdout_error == pytest.approx(1.0, abs=0.1)
+    std = np.sqrt(np.diag(answer.total.covariance))
+    for name, error, s in zip(ELEMENTS, answer.total.values - truth, std, strict=True):
+        assert name in answer.total.unobservable or abs(error) <= 3.5 * s, name
 
 
 def test_a_scan_over_depths_is_one_over_ways_of_rolling() -> None:

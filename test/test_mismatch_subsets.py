@@ -70,3 +70,12 @@ def test_of_two_laws_of_one_thing_one_is_kept() -> None:
     apart = best_subset(best, covariance, groups, amounts, penalties, [(0, 1)])
     without = [evidence(design[:, [k, 2]], data) for k in (0, 1)]
     assert apart == (int(np.argmax(without)), 2)
+
+
+def test_a_number_known_to_more_digits_than_there_are_stays() -> None:
+    """Beside dry hinges that stop a body rounding leaves a covariance without rank."""
+    best = np.array([3.0, 0.1, 0.1])
+    covariance = np.zeros((3, 3))
+    covariance[1:, 1:] = 0.04  # the other two are one, twice
+    kept = best_subset(best, covariance, [[0], [1], [2]], [False] * 3, [1.0] * 3)
+    assert kept == (0,)

@@ -9,19 +9,13 @@ from test_model_rigs import moving, random_sample, trifilar
 from test_model_threads import having
 
 from rig_identification.model import layout
+from rig_identification.model.effects.place import DAMPING, FRICTION, effects_block
 from rig_identification.model.equilibrium import settle
 from rig_identification.model.integrate import EXCITER_CLOCK
 from rig_identification.model.modes import natural_modes
-from rig_identification.model.motion import (
-    RESOLVED,
-    Input,
-    Motion,
-    RigModel,
-    State,
-    _cuts,
-    simulate,
-    substeps_for,
-)
+from rig_identification.model.motion import Input, Motion, RigModel, State, _cuts, rig_model, simulate
+from rig_identification.model.substeps import FIT_STEP, RESOLVED, STABLE, stopping_rate, substeps_for
+from rig_identification.rig import Cable, Rig
 
 FIELDS = ("states", "R_world_body", "outputs", "A", "B", "H", "D", "J")
 
@@ -100,3 +94,52 @@ def test_substeps_follow_the_fastest_bounce(seed: int) -> None:
     step = 0.4
     count = substeps_for(model, step, longest=step)
     assert count == pytest.approx(step * fastest / RESOLVED, rel=0.1)  # near the design pose, not at rest
+
+
+def light_pendulum(friction: float) -> RigModel:
+    """1.6 kg on two threads whose hinges rub."""
+    points = np.array([[-0.2, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    cables = tuple(Cable(f"cable_{i}", p, p, 1.4) for i, p in enumerate(points))
+    elements = np.array([1.6, 0.0, 0.0, -0.1, 0.03, 0.0, 0.0, 0.02, 0.0, 0.03])
+    model = rig_model(Rig(9.80665, cables, 1.6, 0.001), elements)
+    model.physics[effects_block(2) + FRICTION] = friction
+    return model
+
+
+def test_hinges_that_hardly_creep_ask_for_short_steps() -> None:
+    """Longer ones chatter where the hinges hold the body, and what a number does to it grows for ever."""
+    model = light_pendulum(0.02)
+    start = settle(model, State(np.array([0.0, 0.0, -1.4]), np.eye(3), np.zeros(3), np.zeros(3)))
+    rolled = State(start.position, start.R_world_body, np.zeros(3), np.array([0.3, 0.0, 0.0]))
+    drive = Input.none(201, 0.025)
+
+    def answer(substeps: int | None) -> float:
+        motion = simulate(
+            model,
+            rolled,
+            drive,
+            directions=directions_of(model)[1:11],
+            start_basis=tangent_basis(model, rolled),
+            substeps=substeps,
+        )
+        assert motion.complete
+        assert motion.J is not None
+        return float(np.max(np.abs(motion.J)))
+
+    plain = substeps_for(light_pendulum(0.0), 0.025, FIT_STEP)
+    assert plain == 5
+    assert substeps_for(model, 0.025, FIT_STEP) > 2 * plain
+    assert answer(None) < 1e3
+    assert not answer(1) < 1e6
+
+
+def test_the_stopping_rate_is_that_of_a_body_that_rolls_to_a_halt() -> None:
+    """Slow rolling between two hinges on its axis: both rub against J + m d^2 about it."""
+    model = light_pendulum(0.02)
+    rate = stopping_rate(model)
+    about_line = 0.03 + 1.6 * 0.1**2
+    np.testing.assert_array_less(2.0 * 0.02 / 1e-3 / about_line, rate)  # no slower than this way of moving
+    viscous = light_pendulum(0.0)
+    viscous.physics[effects_block(2) + DAMPING] = 20.0
+    assert stopping_rate(viscous) == pytest.approx(rate)
+    assert substeps_for(viscous, 0.025, 1.0) == int(np.ceil(0.025 * rate / STABLE))

@@ -49,14 +49,21 @@ class Departure:
         return max(1.0, self.statistic / max(1, self.directions))
 
 
-def shared_information(information: Array, size: int) -> Array:
-    """(size, size) information on the parameters with the start states integrated out."""
-    cross = information[:size, size:]
-    return np.asarray(information[:size, :size] - cross @ np.linalg.solve(information[size:, size:], cross.T))
-
-
 #: Least information on a combination of parameters, in parts of what there is on each of them.
 LEAST = 1e-9
+
+
+def shared_information(information: Array, size: int) -> Array:
+    """(size, size) information on the parameters with the start states integrated out.
+
+    Where dry hinges stop a motion some of them leave no trace, and count as integrated out already.
+    """
+    cross, starts = information[:size, size:], information[size:, size:]
+    try:
+        lifted = np.linalg.solve(starts, cross.T)
+    except np.linalg.LinAlgError:
+        lifted = np.linalg.lstsq(starts, cross.T, rcond=LEAST)[0]
+    return np.asarray(information[:size, :size] - cross @ lifted)
 
 
 def _lifted(information: Array) -> Array:

@@ -18,7 +18,8 @@ from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors
 from rig_identification.model.constraints import rigid_jacobian
-from rig_identification.model.motion import FIT_STEP, Input, Motion, RigModel, State, simulate, substeps_for
+from rig_identification.model.motion import Input, Motion, RigModel, State, simulate
+from rig_identification.model.substeps import FIT_STEP, substeps_for
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]

@@ -8,6 +8,8 @@ from scipy.signal import savgol_filter
 
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.mismatch.findings import written
 from rig_identification.recording import Recording
 from rig_identification.result import Finding
@@ -16,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: Window over which acceleration is read off the recorded path, s.
 WINDOW = 0.5
+#: s of free motion that a held part is followed with, and mean square up to which both are noise together.
+BEHIND, NOISE = 6.0, 1.2
 
 
 def _pull(run: Run, gravity: float, length: float) -> tuple[Array, Array] | None:
@@ -32,6 +36,23 @@ def _pull(run: Run, gravity: float, length: float) -> tuple[Array, Array] | None
     acceleration = savgol_filter(path, window, 3, deriv=2, delta=step, axis=0)
     calm = savgol_filter(path, window, 3, axis=0)
     return even, acceleration + gravity / length * (calm - np.mean(calm, axis=0))
+
+
+def nobody_held(fitted: Fitted) -> bool:
+    """Whether the model follows what was cut off as a person's hand as well as what it was fitted to.
+
+    What stops a swing within seconds looks like a hand to a model without it.
+    """
+    problem, theta = fitted.problem, fitted.evaluation.point.theta
+    recordings = {r.recording.name: r.recording for r in (*problem.runs, *fitted.holdout_runs, *fitted.lost)}
+    for part in fitted.held_parts:
+        run = prepare(problem.bench.rig, recordings[part.recording])
+        first, last = (round(end / run.grid.step) for end in (part.start, part.end + BEHIND))
+        run = run.between(max(first, 0), last)
+        found = fit_start(problem.bench, run, theta, launch_state(problem.bench, run, theta, fitted.rest))
+        if found is None or float(np.mean(found[0].residual ** 2)) > NOISE:
+            return False
+    return True
 
 
 def hand_finding(fitted: Fitted) -> Finding | None:

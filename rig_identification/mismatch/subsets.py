@@ -18,6 +18,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Part of a number's variance, and variance in units of its prior's, below which it is rounding: where
+#: motions part, as at dry hinges that stop them, some numbers are known to more digits than there are.
+FLOOR = 1e-9
+
 
 def best_subset(
     best: Array,
@@ -44,7 +48,7 @@ def best_subset(
             out = [i for k in everything if k not in kept for i in groups[k]]
             value, score = best, 0.0
             if out:
-                held = covariance[np.ix_(out, out)]
+                held = covariance[np.ix_(out, out)] + np.diag(FLOOR * (np.diag(covariance)[out] + FLOOR))
                 pull = np.linalg.solve(held, best[out])
                 value = best - covariance[:, out] @ pull
                 score = -0.5 * float(best[out] @ pull) - 0.5 * float(np.linalg.slogdet(held)[1])

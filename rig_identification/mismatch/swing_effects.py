@@ -31,6 +31,8 @@ DAMPERS = ("hinge_damping", "hinge_friction", "air_drag")
 STEPS = 8
 #: Where a hypothesis starts, in units of its prior's std.
 FIRST_VALUE = 0.02
+#: Part of the likeliest effect's gain that another one makes before the body's rolling is asked beside it.
+COMPARABLE = 0.5
 #: Times that the choice of effects is made anew about the fit of the one before.
 ROUNDS = 5
 
@@ -61,7 +63,7 @@ def _fitted(candidate: Candidate, problem: Problem, point: Point, steps: int) ->
     """A hypothesis fitted from a point of its problem; None where it cannot be followed."""
     try:
         fitted, _ = solve(problem, point, iterations=steps, tolerance=0.5)
-    except FloatingPointError:
+    except (FloatingPointError, np.linalg.LinAlgError):
         return None
     return finished(Trial(candidate, problem, fitted, log_evidence(fitted), True))
 
@@ -135,13 +137,23 @@ class Choice:
         )
 
 
+def _each_kind(tried: list[Trial], base: float) -> list[Trial]:
+    """The likeliest trial of each effect that gains a part of what the likeliest of all does."""
+    best: dict[str, Trial] = {}
+    for trial in tried:
+        best.setdefault(trial.candidate.effect, trial)
+    enough = COMPARABLE * (tried[0].evidence - base)
+    return [trial for trial in best.values() if trial.evidence - base > enough]
+
+
 def damped(
     raw: Problem, base: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
 ) -> tuple[Choice, Problem, Evaluation] | None:
     """The effects that belong into the model together, and its fit to pieces; None: nothing damps.
 
-    What damps most comes first, for no swing is followed without it; then what changes the body's freedom,
-    which is no matter of degree. Beside that all others are chosen anew, until the choice stays.
+    What damps most comes first, for no swing is followed without it, with the body rolling as suits it;
+    then what changes the body's freedom, which is no matter of degree. Beside that all others are chosen
+    anew, until the choice stays.
     """
     dampers = [c for c in candidates if c.effect in DAMPERS]
     holds = [c for c in candidates if c.settle is not None]
@@ -154,7 +166,10 @@ def damped(
     if not tried:
         return None
     notify("search: how it rolls", 0.3)
-    first = _rolling_otherwise(tried[0])
+    # Fitted to a body that rolls as it does not, what stops a swing is bent to next to nothing
+    first = max(
+        map(_rolling_otherwise, _each_kind(tried, log_evidence(evaluation))), key=lambda t: t.evidence
+    )
     held = _better(first.problem, first.evaluation, holds, count, told(0.35))
     others = tuple(c for c in candidates if c not in holds)
     choice = Choice((first.candidate,), (), others, tuple(tried))

@@ -23,7 +23,7 @@ from rig_identification.estimate.solve import Evaluation, Point, Problem, evalua
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import effects_of, finding
-from rig_identification.mismatch.hands import hand_finding
+from rig_identification.mismatch.hands import hand_finding, nobody_held
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Notify, damped
@@ -130,7 +130,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     evidence = evidence_of(found_ideal, fitted, after.holdout)
     findings = [finding(t, told, evidence) for t in found]
     hand = hand_finding(ideal)
-    if hand is not None:
+    if hand is not None and not (verdict.verdict == "none" and nobody_held(fitted)):
         findings.append(hand)
     named = effects_of(findings)
     if verdict.verdict == "none":

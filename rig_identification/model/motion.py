@@ -7,13 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from rig_identification.model import layout
-from rig_identification.model.body import linear_from_elements, tensor
+from rig_identification.model.body import linear_from_elements
 from rig_identification.model.constraints import project_columns, project_state
-from rig_identification.model.effects.internal import STOP_FREQUENCY
 from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
@@ -24,7 +22,7 @@ from rig_identification.model.effects.place import (
     internal_block,
 )
 from rig_identification.model.integrate import accumulate, propagate
-from rig_identification.model.so3 import skew
+from rig_identification.model.substeps import FINE_STEP, FIT_STEP, hanging, substeps_for
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -90,7 +88,7 @@ def redundant(rig: Rig) -> bool:
     """Whether more cables hold the body than it takes: lines of force dependent near the design pose."""
     ceiling = np.array([c.ceiling_point for c in rig.cables])
     body = np.array([c.body_point for c in rig.cables])
-    along = _hanging(ceiling, body, np.array([c.length for c in rig.cables]))
+    along = hanging(ceiling, body, np.array([c.length for c in rig.cables]))
     arm = body - np.mean(body, axis=0)
     lines = np.concatenate([along, np.cross(arm / max(float(np.max(np.abs(arm))), 1e-9), along)], axis=1)
     if lines.shape[0] > 6:
@@ -238,65 +236,6 @@ class Motion:
     def state(self, node: int) -> State:
         """State at one node."""
         return state_from_vector(self.states[node], self.R_world_body[node])
-
-
-#: Longest step (s) that keeps rigid-cable motion of vehicle rigs (modes up to 1.5 Hz) within 1e-7 m in 10 s.
-FINE_STEP = 0.0034
-#: Longest step for fits: truncation of 1e-6 m, three orders below the sensors' noise.
-FIT_STEP = 0.005
-#: Longest step times the angular frequency of the body's fastest bounce on its cables: its frequency comes
-#: out within 2e-4, the cables' stiffness within 4e-4.
-RESOLVED = 0.4
-#: ... and times that of an internal coordinate.
-RESOLVED_INTERNAL = 0.5
-
-
-def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> int:
-    """Substeps no longer than ``longest`` that resolve the stiffest mode.
-
-    A Runge-Kutta step h slows a swing at angular frequency w by (w h)^4/120.
-    """
-    plain = max(
-        1,
-        int(np.ceil(step / longest - 1e-9)),
-        int(np.ceil(step * _fastest_internal(model) / RESOLVED_INTERNAL)),
-    )
-    elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
-    if not np.any(elastic):
-        return plain
-    return max(plain, int(np.ceil(step * _bounce(model, elastic) / RESOLVED)))
-
-
-def _bounce(model: RigModel, elastic: NDArray[np.bool_]) -> float:
-    """Highest angular frequency (rad/s) of the body on its ``elastic`` cables, near the design pose."""
-    cables = model.cable_numbers()
-    body = cables[:, layout.BODY_POINT : layout.BODY_POINT + 3]
-    ceiling = cables[:, layout.CEILING_POINT : layout.CEILING_POINT + 3]
-    along = _hanging(ceiling, body, cables[:, layout.LENGTH])
-    lines = np.concatenate([along, np.cross(body, along)], axis=1)[elastic]
-    stiffness = (cables[:, layout.AXIAL_STIFFNESS] / cables[:, layout.LENGTH])[elastic]
-    inertial = model.physics[layout.INERTIAL : layout.INERTIAL + 10]
-    moment = skew(inertial[1:4])  # h x A
-    mass = np.block([[inertial[0] * np.eye(3), moment.T], [moment, tensor(inertial[4:])]])
-    squared = eigh(lines.T @ (stiffness[:, None] * lines), mass, eigvals_only=True)
-    return float(np.sqrt(max(float(squared[-1]), 0.0)))
-
-
-def _hanging(ceiling: Array, body: Array, lengths: Array) -> Array:
-    """(n, 3) unit vectors along cables near the design pose: the body level, under its ceiling points."""
-    drop = [0.0, 0.0, float(np.mean(lengths))]
-    along = ceiling - body - np.mean(ceiling - body, axis=0) + drop
-    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
-
-
-def _fastest_internal(model: RigModel) -> float:
-    """Highest angular frequency (rad/s) of the internal coordinates."""
-    fastest = 0.0
-    for k in range(model.internal):
-        o = internal_block(model.cables, k)
-        stops = STOP_FREQUENCY if model.physics[o + layout.STOP] > 0.0 else 0.0
-        fastest = max(fastest, 2.0 * np.pi * max(abs(model.physics[o + layout.FREQUENCY]), stops))
-    return fastest
 
 
 #: Nodes below which a motion is not worth two threads.
