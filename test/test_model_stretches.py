@@ -14,7 +14,7 @@ from rig_identification.model.equilibrium import settle
 from rig_identification.model.integrate import EXCITER_CLOCK
 from rig_identification.model.modes import natural_modes
 from rig_identification.model.motion import Input, Motion, RigModel, State, _cuts, rig_model, simulate
-from rig_identification.model.substeps import FIT_STEP, RESOLVED, STABLE, stopping_rate, substeps_for
+from rig_identification.model.substeps import FIT_STEP, MOST, RESOLVED, STABLE, stopping_rate, substeps_for
 from rig_identification.rig import Cable, Rig
 
 FIELDS = ("states", "R_world_body", "outputs", "A", "B", "H", "D", "J")
@@ -108,7 +108,7 @@ def light_pendulum(friction: float) -> RigModel:
 
 def test_hinges_that_hardly_creep_ask_for_short_steps() -> None:
     """Longer ones chatter where the hinges hold the body, and what a number does to it grows for ever."""
-    model = light_pendulum(0.02)
+    model = light_pendulum(0.008)
     start = settle(model, State(np.array([0.0, 0.0, -1.4]), np.eye(3), np.zeros(3), np.zeros(3)))
     rolled = State(start.position, start.R_world_body, np.zeros(3), np.array([0.3, 0.0, 0.0]))
     drive = Input.none(201, 0.025)
@@ -126,20 +126,20 @@ def test_hinges_that_hardly_creep_ask_for_short_steps() -> None:
         assert motion.J is not None
         return float(np.max(np.abs(motion.J)))
 
-    plain = substeps_for(light_pendulum(0.0), 0.025, FIT_STEP)
-    assert plain == 5
-    assert substeps_for(model, 0.025, FIT_STEP) > 2 * plain
+    assert substeps_for(light_pendulum(0.0), 0.025, FIT_STEP) == 5
+    assert 5 < substeps_for(model, 0.025, FIT_STEP) < MOST
+    assert substeps_for(light_pendulum(1.0), 0.025, FIT_STEP) == MOST
     assert answer(None) < 1e3
     assert not answer(1) < 1e6
 
 
 def test_the_stopping_rate_is_that_of_a_body_that_rolls_to_a_halt() -> None:
     """Slow rolling between two hinges on its axis: both rub against J + m d^2 about it."""
-    model = light_pendulum(0.02)
+    model = light_pendulum(0.008)
     rate = stopping_rate(model)
     about_line = 0.03 + 1.6 * 0.1**2
-    np.testing.assert_array_less(2.0 * 0.02 / 1e-3 / about_line, rate)  # no slower than this way of moving
+    np.testing.assert_array_less(2.0 * 0.008 / 1e-3 / about_line, rate)  # no slower than this way of moving
     viscous = light_pendulum(0.0)
-    viscous.physics[effects_block(2) + DAMPING] = 20.0
+    viscous.physics[effects_block(2) + DAMPING] = 8.0
     assert stopping_rate(viscous) == pytest.approx(rate)
     assert substeps_for(viscous, 0.025, 1.0) == int(np.ceil(0.025 * rate / STABLE))
