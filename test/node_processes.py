@@ -85,6 +85,11 @@ SIMULATOR = [
 ]  # fmt: skip
 
 
+def stamp(message: Any) -> float:
+    """s of a message's header, within a day or so: a clock's whole seconds take its digits."""
+    return float(message.header.stamp.sec % 100_000 + 1e-9 * message.header.stamp.nanosec)
+
+
 def compile_plant_and_tracker() -> None:
     """Run once through what the nodes run, so that its machine code lies in the package's cache."""
     top = YAML(typ="safe").load(RIG)["/**"]["ros__parameters"]

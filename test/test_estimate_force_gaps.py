@@ -107,7 +107,6 @@ def test_a_run_begins_anew_behind_a_gap() -> None:
 def test_a_run_begins_where_something_but_the_force_is_heard() -> None:
     """A logger started 2 s after the exciter's: of the body nothing is known before."""
     whole = make_recording(seconds=8.0)
-
     silent = begun_late(whole, 2.0)
     (run,) = prepare(make_rig(), silent).where_driven()
     np.testing.assert_allclose([run.offset, run.grid.duration], [2.0, whole.duration - 2.0], atol=0.03)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rig_identification.live.sending_clock import HORIZON, SECOND, SLOT, SendingClock
+from rig_identification.live.sending_clock import HORIZON, SLOT, SendingClock
+from rig_identification.live.stamp_gate import SECOND
 
 START = 1_700_000_000 * SECOND
 

@@ -25,6 +25,7 @@ from node_processes import (  # noqa: F401
     Probe,
     graph_of_the_test,
     probe_of_the_test,
+    stamp,
 )
 from sensor_msgs.msg import Imu
 
@@ -45,11 +46,6 @@ def simulated(graph: Graph, *others: str) -> dict[str, subprocess.Popen[str]]:
         "imu": graph.start("imu", "simulation.rate:=100.0"),
     }
     return processes | {name: graph.start(name) for name in others}
-
-
-def stamp(message: Imu) -> float:
-    """s, of its header, within a day."""
-    return float(message.header.stamp.sec % 100_000 + 1e-9 * message.header.stamp.nanosec)
 
 
 def has_taken_signals(process: subprocess.Popen[str]) -> bool:

@@ -18,7 +18,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import InertiaStamped, Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from node_processes import BODY, Diagnostics, Graph, Probe
+from node_processes import BODY, Diagnostics, Graph, Probe, stamp
 from rclpy.serialization import deserialize_message
 from ruamel.yaml import YAML
 from scipy.stats import chi2
@@ -40,10 +40,6 @@ FIT = 400.0
 def ten_of(message: InertiaStamped) -> np.ndarray:
     i = message.inertia
     return np.array([i.m, i.com.x, i.com.y, i.com.z, i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz])
-
-
-def stamp(message: Odometry) -> float:
-    return float(message.header.stamp.sec % 100_000 + 1e-9 * message.header.stamp.nanosec)
 
 
 def decoded(raw: bytes) -> Odometry:

@@ -106,7 +106,7 @@ def headings(rig: Rig, run: Run) -> list[float]:
     channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
     if len(rig.cables) > 2 or run.R_tracker_mean is None or len(channels) < 2:
         seen = all(c.device == "mocap" for c in run.channels)
-        part = 2.0 * np.pi / (1 + len([turn for turn in turns(rig) if turn.exact])) if seen else 2.0 * np.pi
+        part = 2.0 * np.pi / (1 + (sum(turn.exact for turn in turns(rig)) if seen else 0))
         return sorted((part * (k / 8.0) for k in range(-3, 5)), key=abs)
     place, turn = channels["position"], channels["orientation"]
     # Rotation in tracker axes: the mean orientation carries the vector about it there

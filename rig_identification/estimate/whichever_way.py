@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from rig_identification.estimate.first_guess import rest_of
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.mixture import weights
 from rig_identification.estimate.observability import invert_information
@@ -32,7 +33,6 @@ from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.symmetry import Turn, turns
 from rig_identification.model.body import six_elements, tensor
-from rig_identification.model.equilibrium import design_pose, settle
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def whichever_way(
     if not only_seen(problem):
         return estimate, ""
     model = model_at(problem.bench.parameters, evaluation.point.theta)
-    up = settle(model, design_pose(model)).R_world_body[2]
+    up = rest_of(model).R_world_body[2]
     ways = turns(problem.bench.rig, up)
     share = weights([lead(problem, evaluation, turn) for turn in ways])[1:]
     covariance = estimate.covariance.copy()

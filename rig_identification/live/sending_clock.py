@@ -12,9 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.live.stamp_gate import SECOND
+
 Stamps = NDArray[np.int64]
 
-SECOND = 1_000_000_000
 #: s over which the least is taken, and the part of it that is forgotten at once: clocks are set now and then.
 HORIZON, SLOT = 30, 5
 

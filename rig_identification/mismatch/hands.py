@@ -38,13 +38,19 @@ def _pull(run: Run, gravity: float, length: float) -> tuple[Array, Array] | None
     return even, acceleration + gravity / length * (calm - np.mean(calm, axis=0))
 
 
+def _recordings(fitted: Fitted) -> dict[str, Recording]:
+    """Every dynamic recording, whole, by name."""
+    runs = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
+    return {run.recording.name: run.recording for run in runs}
+
+
 def nobody_held(fitted: Fitted) -> bool:
     """Whether the model follows what was cut off as a person's hand as well as what it was fitted to.
 
     What stops a swing within seconds looks like a hand to a model without it.
     """
     problem, theta = fitted.problem, fitted.evaluation.point.theta
-    recordings = {r.recording.name: r.recording for r in (*problem.runs, *fitted.holdout_runs, *fitted.lost)}
+    recordings = _recordings(fitted)
     for part in fitted.held_parts:
         run = prepare(problem.bench.rig, recordings[part.recording])
         first, last = (round(end / run.grid.step) for end in (part.start, part.end + BEHIND))
@@ -67,10 +73,7 @@ def hand_finding(fitted: Fitted) -> Finding | None:
     mass = float(elements.elements(fitted.evaluation.point.theta)[0])
     length = float(np.mean([c.length for c in rig.cables]))
     peak, calm = 0.0, []
-    recordings: dict[str, Recording] = {
-        r.recording.name: r.recording for r in (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
-    }
-    for name, recording in recordings.items():
+    for name, recording in _recordings(fitted).items():
         found = _pull(prepare(rig, recording), rig.gravity, length)
         if found is None:
             continue

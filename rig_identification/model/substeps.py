@@ -52,8 +52,8 @@ def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> in
         1,
         int(np.ceil(step / longest - 1e-9)),
         int(np.ceil(step * _fastest_internal(model) / RESOLVED_INTERNAL)),
+        min(MOST, int(np.ceil(step * stopping_rate(model) / STABLE))),
     )
-    plain = max(plain, min(MOST, int(np.ceil(step * stopping_rate(model) / STABLE))))
     elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
     if not np.any(elastic):
         return plain
@@ -62,14 +62,20 @@ def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> in
 
 def _bounce(model: RigModel, elastic: NDArray[np.bool_]) -> float:
     """Highest angular frequency (rad/s) of the body on its ``elastic`` cables, near the design pose."""
+    along, body, length = _as_designed(model)
+    lines = np.concatenate([along, np.cross(body, along)], axis=1)[elastic]
+    stiffness = (model.cable_numbers()[:, layout.AXIAL_STIFFNESS] / length)[elastic]
+    squared = eigh(lines.T @ (stiffness[:, None] * lines), _mass(model), eigvals_only=True)
+    return float(np.sqrt(max(float(squared[-1]), 0.0)))
+
+
+def _as_designed(model: RigModel) -> tuple[Array, Array, Array]:
+    """Direction (n, 3), body's hinge (n, 3) m and length (n,) m of each cable, near the design pose."""
     cables = model.cable_numbers()
     body = cables[:, layout.BODY_POINT : layout.BODY_POINT + 3]
     ceiling = cables[:, layout.CEILING_POINT : layout.CEILING_POINT + 3]
-    along = hanging(ceiling, body, cables[:, layout.LENGTH])
-    lines = np.concatenate([along, np.cross(body, along)], axis=1)[elastic]
-    stiffness = (cables[:, layout.AXIAL_STIFFNESS] / cables[:, layout.LENGTH])[elastic]
-    squared = eigh(lines.T @ (stiffness[:, None] * lines), _mass(model), eigvals_only=True)
-    return float(np.sqrt(max(float(squared[-1]), 0.0)))
+    length = cables[:, layout.LENGTH]
+    return hanging(ceiling, body, length), body, length
 
 
 def _mass(model: RigModel) -> Array:
@@ -90,13 +96,9 @@ def stopping_rate(model: RigModel) -> float:
     upper, lower = slope + model.physics[o + BENDING], slope + model.physics[o + BENDING + 1]
     if max(upper, lower) <= 0.0:
         return 0.0
-    cables = model.cable_numbers()
-    body = cables[:, layout.BODY_POINT : layout.BODY_POINT + 3]
-    ceiling = cables[:, layout.CEILING_POINT : layout.CEILING_POINT + 3]
-    length = cables[:, layout.LENGTH]
     held = np.zeros((6, 6))
     turning = np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1)
-    for e, b, span in zip(hanging(ceiling, body, length), body, length, strict=True):
+    for e, b, span in zip(*_as_designed(model), strict=True):
         cable = skew(e) @ np.concatenate([np.eye(3), -skew(b)], axis=1) / span
         held += lower * (turning - cable).T @ (turning - cable) + upper * cable.T @ cable
     return float(max(eigh(held, _mass(model), eigvals_only=True)[-1], 0.0))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from rclpy.node import Node
@@ -22,6 +23,15 @@ PATIENCE = 5.0
 #: s without a message on any topic after which nothing more is under way.
 QUIET = 1.5
 _FOREVER = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A stop that waits for the last messages."""
+
+    told: Callable[[dict[str, int]], str]
+    nothing: str
+    later: Later
 
 
 class BagKeeper:
@@ -41,8 +51,7 @@ class BagKeeper:
         self._begun_ns, self._ending_ns = 0, _FOREVER  # sent from then on, and until then
         self._sent: dict[str, int] = {}  # ns, the latest of each topic
         self._asked = self._heard = 0.0  # s, steady: the stop, and the latest message after it
-        self._answer: Callable[[RecordingPlan | None, dict[str, int]], str] | None = None
-        self._later: Later | None = None
+        self._stop: _Asked | None = None
 
     @property
     def plan(self) -> RecordingPlan | None:
@@ -52,7 +61,7 @@ class BagKeeper:
     @property
     def ending(self) -> bool:
         """Whether the last messages of the open recording are waited for."""
-        return self._answer is not None
+        return self._stop is not None
 
     def start(self, plan: RecordingPlan) -> None:
         """Open a recording of what is sent from now on. Raises InputError."""
@@ -66,15 +75,15 @@ class BagKeeper:
         self._begun_ns, self._ending_ns = time.time_ns(), _FOREVER
         self._sent = {}
 
-    def stop(self, answer: Callable[[RecordingPlan | None, dict[str, int]], str]) -> Later:
+    def stop(self, told: Callable[[dict[str, int]], str], nothing: str) -> Later:
         """Close the open recording once all that was sent until now is there.
 
-        answer: what the caller is told, of the recording (None: nothing came) and the messages of each topic;
-        may raise InputError.
+        told: what the caller hears, of the messages of each topic; nothing: where none came, and
+        :attr:`trouble` does not say why.
         """
         self._ending_ns, self._asked = time.time_ns(), time.monotonic()
-        self._heard, self._answer, self._later = self._asked, answer, Later()
-        return self._later
+        self._heard, self._stop = self._asked, _Asked(told, nothing, Later())
+        return self._stop.later
 
     def write(self, batch: Batch) -> None:
         """Write what belongs to the open recording. On a full disk it ends, and :attr:`trouble` says so."""
@@ -93,7 +102,7 @@ class BagKeeper:
 
     def look(self) -> None:
         """Close the recording that was told to end, if nothing of it is under way any longer."""
-        if self._answer is None:
+        if self._stop is None:
             return
         now = time.monotonic()
         if now - self._asked > PATIENCE or now - self._heard > QUIET or self._complete():
@@ -109,14 +118,14 @@ class BagKeeper:
 
     def close(self) -> None:
         """Close the open recording as it is, and answer who waits for that."""
-        answer, later = self._answer, self._later
-        self._answer, self._later = None, None
+        asked, self._stop = self._stop, None
         counts = dict(self.folder.counts)
         try:
-            plan = self.folder.stop()
-            if answer is not None and later is not None:
-                later.answer(True, answer(plan, counts))
+            came = self.folder.stop() is not None
         except InputError as error:
-            if later is None:
+            if asked is None:
                 raise
-            later.answer(False, str(error))
+            asked.later.answer(False, str(error))
+            return
+        if asked is not None:
+            asked.later.answer(came, asked.told(counts) if came else self.trouble or asked.nothing)

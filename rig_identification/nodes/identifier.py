@@ -23,7 +23,7 @@ from rig_identification.nodes.recording_parameters import RECORDING, planned
 from rig_identification.nodes.result_messages import inertia_message, matrix_message, mismatch_message
 from rig_identification.nodes.rig_node import ERROR, LATCHED, OK, RigNode, diagnostic
 from rig_identification.nodes.running import RunningEstimator
-from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
+from rig_identification.nodes.session_folder import SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
 from rig_identification.session.session_description import read_session_description
 from rig_identification.session.topics import expected_topics
@@ -117,15 +117,13 @@ class IdentifierNode(RigNode):
             raise InputError(f"window {plan.name} waits for its last messages already")
         self.running.listen(False)
 
-        def answer(done: RecordingPlan | None, counts: dict[str, int]) -> str:
-            if done is None:
-                nothing = f"window {plan.name}: no message came on any topic; nothing was kept"
-                raise InputError(self.keeper.trouble or nothing)
+        def told(counts: dict[str, int]) -> str:
             missing = [name for name in self._expected() if not counts.get(name)]
             silent = f"; silent: {', '.join(missing)}" if missing else ""
             return f"window {plan.name}: {sum(counts.values())} messages on {len(counts)} topics{silent}"
 
-        return self.keeper.stop(answer)
+        nothing = f"window {plan.name}: no message came on any topic; nothing was kept"
+        return self.keeper.stop(told, nothing)
 
     def _expected(self) -> list[str]:
         """Topics that a window should hold: every cable's, and what came at any time."""

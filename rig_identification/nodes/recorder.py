@@ -13,7 +13,7 @@ from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.parameters import OwnParameter, one_of, within
 from rig_identification.nodes.recording_parameters import RECORDING, planned
 from rig_identification.nodes.rig_node import ERROR, OK, RigNode, diagnostic
-from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
+from rig_identification.nodes.session_folder import SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
 from rig_identification.session.topics import expected_topics
 
@@ -53,20 +53,18 @@ class RecorderNode(RigNode):
 
     def _stop(self) -> Later:
         self._work()
-        plan, trouble = self.session.plan, self.keeper.trouble
+        plan = self.session.plan
         if plan is None:
-            raise InputError(trouble or "nothing is being recorded; call ~/start first")
+            raise InputError(self.keeper.trouble or "nothing is being recorded; call ~/start first")
         if self.keeper.ending:
             raise InputError(f"recording {plan.name} waits for its last messages already")
 
-        def answer(done: RecordingPlan | None, counts: dict[str, int]) -> str:
-            if done is None:
-                nothing = f"recording {plan.name}: no message came on any topic; nothing was written"
-                raise InputError(self.keeper.trouble or nothing)
-            told = f"{sum(counts.values())} messages on {len(counts)} topics in {self.session.folder}"
-            return f"{plan.name}: {told}"
+        def told(counts: dict[str, int]) -> str:
+            messages = f"{sum(counts.values())} messages on {len(counts)} topics"
+            return f"{plan.name}: {messages} in {self.session.folder}"
 
-        return self.keeper.stop(answer)
+        nothing = f"recording {plan.name}: no message came on any topic; nothing was written"
+        return self.keeper.stop(told, nothing)
 
     def _work(self) -> None:
         for batch in self.intake.take():

@@ -103,9 +103,9 @@ class RigNode(Node):
 
         def call() -> Later | Trigger.Response:
             success, message = self.outcome(answer)
-            return (
-                message if isinstance(message, Later) else Trigger.Response(success=success, message=message)
-            )
+            if isinstance(message, Later):
+                return message
+            return Trigger.Response(success=success, message=message)
 
         serve_later(self, name, call, group)
 
