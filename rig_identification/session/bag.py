@@ -41,6 +41,7 @@ class Bag:
     folder: Path
     listed: dict[str, str]  # every topic of the bag -> its message type
     topics: dict[str, RawTopic]
+    counts: dict[str, int]  # every topic of the bag -> its messages by metadata.yaml
 
 
 def read_bag(folder: Path, wanted: Collection[str]) -> Bag:
@@ -86,9 +87,11 @@ def _read(folder: Path, reader: DirectoryReader, wanted: Collection[str]) -> Bag
     collector = Collector(zstd.decompress if reader.metadata.compression_mode == "message" else None)
     _collect(reader, {connection.topic for connection in chosen}, collector)
     _check_complete(folder, chosen, collector)
-    return Bag(
-        folder, listed, {name: collector.take(name, listed[name]) for name in listed if name in wanted}
-    )
+    counts = dict.fromkeys(listed, 0)
+    for connection in reader.connections:
+        counts[connection.topic] += connection.msgcount
+    topics = {name: collector.take(name, listed[name]) for name in listed if name in wanted}
+    return Bag(folder, listed, topics, counts)
 
 
 def _collect(reader: DirectoryReader, topics: set[str], collector: Collector) -> None:

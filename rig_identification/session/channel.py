@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
+from rig_identification.raw import RawChannel
 from rig_identification.recording import ChannelQuality, Overrange, Series
 from rig_identification.session.cdr import decode
 from rig_identification.session.clipping import Limit, limits
@@ -99,13 +100,13 @@ class Channel:
         return Overrange(name, quantity, axis, unit, limit.value, len(stamps), first, last)
 
 
-def read_channel(raw: RawTopic, topic: Topic, where: str) -> Channel:
-    """Decode and clean one topic; ``where`` is the bag, for messages.
+def raw_channel(raw: RawTopic, topic: Topic, where: str) -> RawChannel:
+    """Decode one topic, whatever its stamps and numbers; ``where`` is the bag, for messages.
 
     Raises
     ------
     InputError
-        Wrong message type, no message, or no message with a usable stamp.
+        Wrong message type, no message, or one that does not deserialize.
     """
     if raw.message_type != topic.message_type:
         raise InputError(
@@ -120,12 +121,29 @@ def read_channel(raw: RawTopic, topic: Topic, where: str) -> Channel:
         stamp_ns, decoded = decode(raw)
     except InputError as err:
         raise InputError(f"{where}: {err}") from err
-    selection = select_stamps(stamp_ns, raw.received_ns)
+    values = decoded[:, _COLUMNS[topic.channel]]
+    return RawChannel(
+        topic.name, topic.channel, topic.message_type, stamp_ns, raw.received_ns, values, topic.cable
+    )
+
+
+def clean_channel(raw: RawChannel, where: str) -> Channel:
+    """Choose the usable samples of one topic; ``where`` is the bag, for messages.
+
+    Raises
+    ------
+    InputError
+        No message has a usable stamp.
+    """
+    selection = select_stamps(raw.stamp_ns, raw.received_ns)
     if not len(selection.kept):
         raise InputError(
-            f"{where}: {topic.name}: none of {raw.count} stamps is usable; stamp the messages when measured"
+            f"{where}: {raw.topic}: none of {len(raw.stamp_ns)} stamps is usable; "
+            "stamp the messages when measured"
         )
-    return _clean(topic, raw.count, selection, stamp_ns[selection.kept], decoded[selection.kept])
+    topic = Topic(raw.topic, raw.channel, raw.message_type, raw.cable)
+    kept = selection.kept
+    return _clean(topic, len(raw.stamp_ns), selection, raw.stamp_ns[kept], raw.values[kept])
 
 
 def _clean(
@@ -133,9 +151,8 @@ def _clean(
     count: int,
     selection: StampSelection,
     stamp_ns: NDArray[np.int64],
-    decoded: NDArray[np.float64],
+    values: NDArray[np.float64],
 ) -> Channel:
-    values = decoded[:, _COLUMNS[topic.channel]]
     values = np.where(np.abs(values) < _ABSURD, values, np.nan)
     notes: tuple[str, ...] = ()
     if topic.channel in _POSES:

@@ -1,4 +1,8 @@
-"""A session on disk to a validated :class:`~rig_identification.recording.Session`."""
+"""A session on disk to a validated :class:`~rig_identification.recording.Session`, in two stages.
+
+:func:`read_raw` takes every message as it stands; :func:`clean` chooses the usable samples. What examines a
+session (``check/``) works between them.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from rig_identification.errors import InputError
+from rig_identification.raw import RawRecording, RawSession
 from rig_identification.recording import ChannelQuality, Recording, Series, Session
 from rig_identification.rig import Rig
-from rig_identification.session.bag import Bag, read_bag
-from rig_identification.session.channel import Channel, read_channel
+from rig_identification.session.bag import read_bag
+from rig_identification.session.channel import Channel, clean_channel, raw_channel
 from rig_identification.session.rest import check_rest
 from rig_identification.session.rig_description import read_rig
 from rig_identification.session.session_description import BagEntry, read_session_description
@@ -36,6 +41,20 @@ def read_session(
 ) -> Session:
     """Read a session: description, rig and every bag, validated once.
 
+    Parameters and errors as of :func:`read_raw` and :func:`clean`.
+    """
+    return clean(read_raw(path, namespace=namespace, topics=topics, progress=progress))
+
+
+def read_raw(
+    path: str | Path,
+    *,
+    namespace: str = DEFAULT_NAMESPACE,
+    topics: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+) -> RawSession:
+    """Read a session's descriptions and every message of the contract's topics.
+
     Parameters
     ----------
     path : str or Path
@@ -50,7 +69,7 @@ def read_session(
     Raises
     ------
     InputError
-        The first thing that cannot be used, as one line: where, what, which value, what to do.
+        The first thing that cannot be read, as one line: where, what, which value, what to do.
     """
     description = read_session_description(Path(path))
     rig = read_rig(description.rig_file)
@@ -59,34 +78,55 @@ def read_session(
     for entry in description.entries:
         if progress is not None:
             progress(f"reading {entry.name}")
-        recordings.append(_read_recording(entry, rig, expected, namespace))
+        recordings.append(_read_raw(entry, expected))
     name = description.file.resolve().parent.name
-    return Session(name=name, rig=rig, recordings=tuple(recordings))
+    return RawSession(name, rig, tuple(recordings), namespace)
 
 
-def _read_recording(entry: BagEntry, rig: Rig, expected: dict[str, Topic], namespace: str) -> Recording:
+def clean(raw: RawSession) -> Session:
+    """Choose the usable samples of every recording.
+
+    Raises
+    ------
+    InputError
+        The first recording that cannot be used: no topic of the contract, no usable stamp, a static recording
+        that moves, a run too short.
+    """
+    recordings = tuple(_cleaned(recording, raw.rig, raw.namespace) for recording in raw.recordings)
+    return Session(name=raw.name, rig=raw.rig, recordings=recordings)
+
+
+def _read_raw(entry: BagEntry, expected: dict[str, Topic]) -> RawRecording:
     bag = read_bag(entry.folder, expected)
-    channels = [
-        read_channel(bag.topics.pop(name), expected[name], str(bag.folder)) for name in list(bag.topics)
-    ]
+    channels = tuple(
+        raw_channel(bag.topics.pop(name), expected[name], str(bag.folder)) for name in list(bag.topics)
+    )
+    return RawRecording(
+        name=entry.name, kind=entry.kind, holdout=entry.holdout, where=str(bag.folder), channels=channels,
+        listed=bag.listed, counts=bag.counts, dummy=entry.dummy,
+    )  # fmt: skip
+
+
+def _cleaned(raw: RawRecording, rig: Rig, namespace: str) -> Recording:
+    channels = [clean_channel(channel, raw.where) for channel in raw.channels]
     if all(channel.topic.channel == "ground_truth" for channel in channels):
-        known = ", ".join(sorted(bag.listed)) or "none"
+        known = ", ".join(sorted(raw.listed)) or "none"
         raise InputError(
-            f"{bag.folder}: no topic of the contract in the bag; it has {known}: map the topics or namespace"
+            f"{raw.where}: no topic of the contract in the bag; it has {known}: map the topics or namespace"
         )
     together, apart = _on_one_clock(channels)
     start_ns = min(int(channel.ordered_ns[0]) for channel in together)
     duration = (max(int(channel.ordered_ns[-1]) for channel in together) - start_ns) / 1e9
-    reasons = {id(channel): _left_aside(channel, rig, bag) for channel in together}
+    reasons = {id(channel): _left_aside(channel, rig, raw.where) for channel in together}
     used = [channel for channel in together if reasons[id(channel)] is None]
     quality = [channel.quality(start_ns, *filter(None, [reasons[id(channel)]])) for channel in together]
     quality += [
         channel.quality(start_ns, "stamps are on another clock than the other topics': left aside")
         for channel in apart
     ]
-    quality += _foreign(bag, expected, namespace)
-    recording = _recording(entry, start_ns, duration, used, tuple(quality))
-    _check_motion(recording, rig, bag)
+    quality += _foreign(raw, {channel.topic for channel in raw.channels}, namespace)
+    recording = _recording(raw, start_ns, duration, used, tuple(quality))
+    _check_motion(recording, rig, raw.where)
     return recording
 
 
@@ -105,23 +145,23 @@ def _on_one_clock(channels: list[Channel]) -> tuple[list[Channel], list[Channel]
     return together, [channel for channel, is_near in zip(channels, near, strict=True) if not is_near]
 
 
-def _left_aside(channel: Channel, rig: Rig, bag: Bag) -> str | None:
+def _left_aside(channel: Channel, rig: Rig, where: str) -> str | None:
     """Why a channel cannot be used with this rig description, None where it can."""
     device = _MOUNTED.get(channel.topic.channel)
     if device is None or getattr(rig, device) is not None:
         return None
     if device == "exciter" and np.any(channel.values):
         raise InputError(
-            f"{bag.folder}: {channel.topic.name}: a force is recorded, the rig description has no exciter; "
+            f"{where}: {channel.topic.name}: a force is recorded, the rig description has no exciter; "
             "add its position and orientation"
         )
     return f"the rig description has no {device}: left aside"
 
 
-def _foreign(bag: Bag, expected: dict[str, Topic], namespace: str) -> list[ChannelQuality]:
+def _foreign(raw: RawRecording, expected: set[str], namespace: str) -> list[ChannelQuality]:
     """Topics of cables that the rig description does not know."""
     accounts = []
-    for name in bag.listed:
+    for name in raw.listed:
         cable = foreign_cable(name, namespace)
         if cable is not None and name not in expected:
             note = f"{cable} is no cable of the rig description: left aside"
@@ -130,7 +170,11 @@ def _foreign(bag: Bag, expected: dict[str, Topic], namespace: str) -> list[Chann
 
 
 def _recording(
-    entry: BagEntry, start_ns: int, duration: float, used: list[Channel], quality: tuple[ChannelQuality, ...]
+    raw: RawRecording,
+    start_ns: int,
+    duration: float,
+    used: list[Channel],
+    quality: tuple[ChannelQuality, ...],
 ) -> Recording:
     tension: dict[str, Series] = {}
     others: dict[str, Series | None] = {}
@@ -143,16 +187,16 @@ def _recording(
         elif series is not None:
             tension[channel.topic.cable] = series
     return Recording(
-        name=entry.name, kind=entry.kind, holdout=entry.holdout, start_ns=start_ns, duration=duration,
-        dummy=entry.dummy, tension=tension, exciter_unmeasured=unmeasured, quality=quality, **others,
+        name=raw.name, kind=raw.kind, holdout=raw.holdout, start_ns=start_ns, duration=duration,
+        dummy=raw.dummy, tension=tension, exciter_unmeasured=unmeasured, quality=quality, **others,
     )  # fmt: skip
 
 
-def _check_motion(recording: Recording, rig: Rig, bag: Bag) -> None:
+def _check_motion(recording: Recording, rig: Rig, where: str) -> None:
     if recording.kind == "static":
-        check_rest(recording, rig, str(bag.folder))
+        check_rest(recording, rig, where)
     elif recording.duration < SHORTEST_RUN:
         raise InputError(
-            f"{bag.folder}: dynamic run lasts {recording.duration:.3g} s, less than {SHORTEST_RUN:g} s; "
+            f"{where}: dynamic run lasts {recording.duration:.3g} s, less than {SHORTEST_RUN:g} s; "
             "record a longer one"
         )
