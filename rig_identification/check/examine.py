@@ -1,0 +1,32 @@
+"""The whole examination: stamps first, then each channel by itself, then channels against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rig_identification.check import readings, stamps
+from rig_identification.check.found import examiners
+from rig_identification.examination import Examination, SetupFault
+from rig_identification.raw import RawSession
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What an examination found, and the session as it is to be used."""
+
+    examination: Examination
+    session: RawSession  # corrected
+
+
+def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> Examined:
+    """Examine a session. progress: called with one sentence before each stage."""
+    session, faults = raw, list[SetupFault]()
+    for stage, package in (("stamps", stamps), ("readings", readings)):
+        if progress is not None:
+            progress(f"checking {stage}")
+        for examiner in examiners(package):
+            for found in examiner.find(session):
+                session = found.session
+                faults.append(found.fault)
+    return Examined(Examination(raw.name, (), (), tuple(faults)), session)
