@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from rig_identification.check import readings, stamps
 from rig_identification.check.found import examiners
-from rig_identification.examination import Examination, SetupFault
+from rig_identification.check.inventory import inventory
+from rig_identification.check.left_aside import left_aside
+from rig_identification.examination import Examination, RestReading, SetupFault
 from rig_identification.raw import RawSession
 
 
@@ -29,4 +31,9 @@ def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> E
             for found in examiner.find(session):
                 session = found.session
                 faults.append(found.fault)
-    return Examined(Examination(raw.name, (), (), tuple(faults)), session)
+    rest = tuple[RestReading, ...]()
+    # Channels against each other and against the description go here; they also give the readings at rest.
+    topics = inventory(raw, session)
+    aside = left_aside(raw, session, topics)
+    notes = (*raw.notes, *(note for recording in raw.recordings for note in recording.notes), *aside.notes)
+    return Examined(Examination(raw.name, topics, rest, tuple(faults), aside.warnings, notes), session)
