@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.examination import Examination
+
 Array = NDArray[np.float64]
 
 #: Order of the covariance and of names in ``unobservable``.
@@ -69,6 +71,8 @@ class Finding:
     parameters: dict[str, dict[str, object]]  # name -> {"value", "std", "unit"}
     evidence: dict[str, float | None]
     statement: str
+    advice: str = ""  # of a fault of the set-up: what to change
+    correction: str = ""  # of a fault of the set-up: the corrected lines
 
 
 @dataclass(frozen=True)
@@ -95,3 +99,4 @@ class Identification:
     converged: bool
     notes: tuple[str, ...] = ()  # sentences for the report: warnings, what was left aside
     figures: dict[str, object] = field(default_factory=dict)  # numbers behind further pictures
+    examination: Examination | None = None  # of the set-up, before anything was fitted; None: there was none

@@ -19,6 +19,9 @@ from rig_identification.cli.output import write_together
 from rig_identification.cli.progress import QUIET_SECONDS, StageProgress
 from rig_identification.cli.summary import summary
 from rig_identification.errors import InputError
+from rig_identification.examination import Examination
+from rig_identification.identification import Prepared
+from rig_identification.raw import RawRecording, RawSession
 from rig_identification.recording import Session
 from rig_identification.result import Identification
 
@@ -37,14 +40,17 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
                 raise outcome
             return identification
 
-        def read_session(path: Path, **options: object) -> Session:
+        def read_raw(path: Path, **options: object) -> RawSession:
             seen.update(options, path=path)
-            return session
+            listed = {"/xsens/imu": "sensor_msgs/msg/Imu", "/vicon/van": "geometry_msgs/msg/PoseStamped"}
+            return RawSession("van", session.rig, (RawRecording("run_1", "dynamic", False, "", (), listed),))
 
         module = types.ModuleType("rig_identification.mismatch")
         module.identify = identify  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "rig_identification.mismatch", module)
-        monkeypatch.setattr("rig_identification.session.read_session", read_session)
+        monkeypatch.setattr("rig_identification.session.read_raw", read_raw)
+        prepared = Prepared(session, Examination("van", (), (), (), ("imu: nobody knows.",)))
+        monkeypatch.setattr("rig_identification.identification.prepare", lambda *_: prepared)
 
     install.seen = seen  # type: ignore[attr-defined]
     return install
@@ -60,6 +66,7 @@ def test_writes_result_and_report_and_prints_the_numbers(
     assert json.loads((out / "result.json").read_text())["mass"]["value"] == 1240.13
     printed = capsys.readouterr()
     assert "1240.13 ± 0.78 kg" in " ".join(printed.out.split())
+    assert "warning: imu: nobody knows." in printed.out
     assert printed.out.rstrip().endswith(str(out / "report.html"))
     assert printed.err == ""
 
@@ -88,6 +95,19 @@ def test_topics_and_namespace_reach_the_reader(answer: Install, tmp_path: Path) 
     seen = answer.seen  # type: ignore[attr-defined]
     assert seen["namespace"] == "/lab"
     assert seen["topics"] == {"imu/data_raw": "/xsens/imu", "mocap/pose": "/vicon/van"}
+
+
+@pytest.mark.parametrize("command", ["identify", "check"])
+def test_a_topic_that_is_asked_for_and_not_there_is_an_error(
+    answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    answer(AssertionError("the work must not begin"))
+    out = tmp_path / "out"
+    assert main([command, "van", "--out", str(out), "--topic", "imu/data_raw=/xsens/imus"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "no bag holds /xsens/imus; did you mean /xsens/imu" in error
+    assert not out.exists()
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,8 @@ ALLOWED = {
     "session": set(),
     "report": CORE,
     "live": {"model", "statics", "estimate"},
-    "nodes": CORE | {"session", "report"},
+    "identification": {"check", "mismatch", "session"},
+    "nodes": CORE | {"session", "report", "identification"},
 }
 OUTSIDE_THE_CORE = {
     "argparse",
@@ -105,7 +106,7 @@ def test_core_knows_no_files_no_ros_no_terminal(path: Path) -> None:
 def test_the_walk_sees_the_rooms() -> None:
     assert {"session", "report", "cli", "model"} <= {room(path) for path in modules()}
     assert "report" in rooms_imported(PACKAGE / "cli" / "summary.py")
-    assert f"{NAME}.session.read_session" in imported(PACKAGE / "cli" / "commands" / "identify.py")
+    assert f"{NAME}.identification.prepare" in imported(PACKAGE / "cli" / "commands" / "identify.py")
 
 
 def test_a_relative_import_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""What is mounted and not recorded, and what is recorded and not used: sentences that a person should read."""
+"""What is mounted and not recorded, and what is recorded and not used, in sentences."""
 
 from __future__ import annotations
 
@@ -90,8 +90,8 @@ def _missing(
             like = difflib.get_close_matches(_prefix(raw) + topic, like, n=1, cutoff=0.6)
         claimed |= set(like)
         sentences.append(
-            f"{device}: the rig description mounts it, and no bag holds {_prefix(raw)}{topic}: it tells nothing "
-            f"of this session. {_mapping(topic, like, strangers)}"
+            f"{device}: the rig description mounts it, and no bag holds {_prefix(raw)}{topic}: "
+            f"it tells nothing of this session. {_mapping(topic, like, strangers)}"
         )
     return sentences, frozenset(claimed)
 
@@ -141,7 +141,10 @@ def _unclaimed(
             if cable is not None
             else f"it is no topic of the contract under {_prefix(raw).rstrip('/') or '/'}"
         )
-        yield f"{name} ({kind}, in {where}) is not used: {why}. Map it with --topic where it is one of the rig's."
+        yield (
+            f"{name} ({kind}, in {where}) is not used: {why}. "
+            "Map it with --topic where it is one of the rig's."
+        )
 
 
 def _cable_of(raw: RawSession, topic: str) -> str | None:
@@ -171,8 +174,8 @@ def _apart(used: RawSession) -> Iterator[str]:
     for topic, places in found.items():
         most = max((seconds for _, seconds in places), key=abs)
         yield (
-            f"{topic}: its {shift_text(most)} in {_listed([name for name, _ in places])}: they share no time, "
-            "and nothing of it is used. Set the device's clock, or stamp when measured."
+            f"{topic}: its {shift_text(most)} in {_listed([name for name, _ in places])}: "
+            "they share no time, and nothing of it is used. Set the device's clock, or stamp when measured."
         )
 
 

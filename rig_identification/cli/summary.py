@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from rig_identification.cli.checked import setup_lines
+from rig_identification.cli.plain_numbers import plain_number
 from rig_identification.report.quantity import NOT_DETERMINED
 from rig_identification.report.ten_numbers import elements
 from rig_identification.result import Identification, InertialEstimate
 
 
 def summary(identification: Identification) -> str:
-    """Table of the ten numbers with the half-widths of their 95 % intervals, and the verdict."""
+    """What is wrong with the set-up, the ten numbers with half-widths of 95 % intervals, and the verdict."""
     if identification.without_frame is None:
         tables = [_table("95 % intervals", identification.total)]
     else:
@@ -18,12 +20,14 @@ def summary(identification: Identification) -> str:
         ]
     mismatch = identification.mismatch
     verdict = f"verdict: {mismatch.verdict}. {mismatch.explanation}"
-    return "\n\n".join([*tables, verdict])
+    examination = identification.examination
+    set_up = [] if examination is None else ["\n".join(setup_lines(examination))]
+    return "\n\n".join(filter(None, [*set_up, *tables, verdict]))
 
 
 def _table(title: str, estimate: InertialEstimate) -> str:
     ten = elements(estimate)
-    texts = [(e.symbol + e.index, _plain(e.value), _plain(e.half_width), e.unit) for e in ten]
+    texts = [(e.symbol + e.index, plain_number(e.value), plain_number(e.half_width), e.unit) for e in ten]
     width = max((len(value) for _, value, _, _ in texts), default=0)
     doubt = max((len(half) for _, _, half, _ in texts), default=0)
     lines = [title]
@@ -31,8 +35,3 @@ def _table(title: str, estimate: InertialEstimate) -> str:
         known = f"{value:>{width}} ± {half:<{doubt}} {unit}"
         lines.append(f"  {name:<4}{known if element.observable else NOT_DETERMINED}")
     return "\n".join(lines)
-
-
-def _plain(number: str) -> str:
-    """Digits that can be pasted into a calculation."""
-    return number.replace("\u202f", "").replace("−", "-")

@@ -31,20 +31,24 @@ def fit(path: str) -> dict[str, object]:
 
     Raises InputError.
     """
+    from rig_identification.identification import identify_prepared, prepare
     from rig_identification.live.excitation import motion_in_noise, moves
-    from rig_identification.mismatch import identify
     from rig_identification.report.result_json import result_to_dict
-    from rig_identification.session import read_session
+    from rig_identification.session import read_raw
 
-    session = read_session(path, progress=lambda stage: _say("progress", stage=stage, fraction=0.0))
+    def begun(stage: str) -> None:
+        _say("progress", stage=stage, fraction=0.0)
+
+    prepared = prepare(read_raw(path, progress=begun), begun)
+    session = prepared.session
     for recording in session.training:
         if not moves(recording):
             raise InputError(
                 f"{recording.name}: the body does not move (readings scatter by "
                 f"{motion_in_noise(recording):.2f} times their noise): shake it, or record it as static"
             )
-    identification = identify(
-        session, lambda stage, fraction: _say("progress", stage=stage, fraction=fraction)
+    identification = identify_prepared(
+        prepared, lambda stage, fraction: _say("progress", stage=stage, fraction=fraction)
     )
     notes = list(identification.notes)
     for recording in session.recordings:

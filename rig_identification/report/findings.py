@@ -52,9 +52,9 @@ class Shift:
     shift: str  # in standard deviations of the second
 
 
-def finding_views(mismatch: Mismatch) -> list[FindingView]:
-    """Write out every finding."""
-    return [_view(finding, index) for index, finding in enumerate(mismatch.findings, start=1)]
+def finding_views(mismatch: Mismatch, set_up: int = 0) -> list[FindingView]:
+    """Write out every finding but the first ``set_up`` ones, which are faults of the set-up."""
+    return [_view(finding, index) for index, finding in enumerate(mismatch.findings[set_up:], start=1)]
 
 
 def alternative_views(mismatch: Mismatch) -> list[AlternativeView]:
@@ -86,7 +86,9 @@ def _view(finding: Finding, index: int) -> FindingView:
         title=_words(finding.effect).capitalize(),
         anchor=f"finding-{index}",
         statement=finding.statement,
-        where=tuple((key, _place(key, value)) for key, value in finding.where.items() if value is not None),
+        where=tuple(
+            (key, place_text(key, value)) for key, value in finding.where.items() if value is not None
+        ),
         parameters=tuple(_parameter(name, entry) for name, entry in finding.parameters.items()),
         gain=_number(finding.evidence.get("log_likelihood_gain")),
         before=_finite(finding.evidence.get("holdout_error_before")),
@@ -103,6 +105,8 @@ def _alternative(alternative: Mapping[str, object]) -> AlternativeView:
         amount = f"{name} {value} ± {half} {unit}" if half else f"{name} {value} {unit}"
     elif alternative.get("fitted") is False:
         amount = "not fitted: time was over"
+    elif alternative.get("statement"):
+        amount = str(alternative["statement"])
     return AlternativeView(
         effect=_words(str(alternative.get("effect", ""))),
         where=", ".join(str(place) for place in places if isinstance(place, str)),
@@ -130,11 +134,14 @@ def _parameter(name: str, entry: Mapping[str, object]) -> tuple[str, str, str, s
     return _words(name), *value_and_half_width(value, std), unit
 
 
-def _place(key: str, value: object) -> str:
+def place_text(key: str, value: object) -> str:
+    """What a finding's ``where`` says under one key."""
     if key == "times" and isinstance(value, Sequence):
         return "; ".join(_time(t) for t in value if isinstance(t, Mapping))
     if key == "position" and isinstance(value, (Sequence, np.ndarray)):
         return "(" + ", ".join(number(float(v), 2) for v in value) + ") m in body"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(str(item) for item in value)
     return str(value)
 
 

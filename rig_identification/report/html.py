@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from rig_identification import __version__
@@ -13,8 +12,10 @@ from rig_identification.report.channels import finite_channels, recording_views
 from rig_identification.report.determined import determinations, sensors_used
 from rig_identification.report.doubts import doubt_groups
 from rig_identification.report.findings import alternative_views, finding_views, shifts
+from rig_identification.report.page import page_environment
 from rig_identification.report.residual_views import rms_table, whiteness_views
 from rig_identification.report.rig_drawing import rig_scene, rig_svgs
+from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
 from rig_identification.result import Identification
 
@@ -35,16 +36,9 @@ def render_report(identification: Identification, session: Session) -> str:
     str
         HTML that loads nothing from anywhere.
     """
-    environment = Environment(
-        loader=PackageLoader("rig_identification.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    source = environment.loader.get_source(environment, "style.css")[0] if environment.loader else ""
+    environment, style = page_environment()
     return environment.get_template("report.html.j2").render(
-        style=Markup(source), version=__version__, **_chapters(identification, session)
+        style=style, version=__version__, **_chapters(identification, session)
     )
 
 
@@ -58,22 +52,28 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
     channels, lost = finite_channels(identification.channels)
     recordings = recording_views(channels, roles)
     names = [view.name for view in recordings]
+    examination = identification.examination
+    faults = () if examination is None else examination.faults
+    faulty = frozenset[str]() if examination is None else faulty_parts(examination, session.rig)
+    told = frozenset[str]() if examination is None else frozenset(examination.warnings)
     return {
         "session": session,
         "identification": identification,
         "roles": roles,
-        "notes": (*identification.notes, *lost),
+        "notes": (*(note for note in identification.notes if note not in told), *lost),
+        "setup": None if examination is None else setup_view(examination),
         "blocks": blocks(identification),
         "recordings": recordings,
         "rms_rows": rms_table(channels, names),
         "whiteness": [(v, whiteness_views(channels, v.name)) for v in recordings if v.role != "at rest"],
-        "findings": finding_views(identification.mismatch),
+        "findings": finding_views(identification.mismatch, len(faults)),
         "alternatives": alternative_views(identification.mismatch),
         "shifts": shifts(identification),
         "determinations": determinations(identification, session),
         "sensors": sensors_used(session),
         "doubts": doubt_groups(identification.parameters),
         "views": [
-            (name, Markup(svg)) for name, svg in rig_svgs(rig_scene(session.rig, identification.total))
+            (name, Markup(svg))
+            for name, svg in rig_svgs(rig_scene(session.rig, identification.total, faulty))
         ],
     }

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.result import ELEMENTS, Identification, InertialEstimate, Mismatch
+from rig_identification.report.examination_json import check_part
+from rig_identification.report.plain import plain
+from rig_identification.result import ELEMENTS, Finding, Identification, InertialEstimate, Mismatch
 
 #: Index into the ten elements of each entry of the inertia tensor.
 INERTIA_INDEX = ((4, 5, 6), (5, 7, 8), (6, 8, 9))
@@ -25,7 +26,8 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         deviations and their rows and columns of the covariance.
         ``without_frame`` is None where no frame was described. Where effects were found,
         ``mismatch`` holds one key more, ``ideal_model``: mass, centre of mass, inertia and what is
-        unobservable as the ideal model alone has them.
+        unobservable as the ideal model alone has them. Where the session was examined, ``check`` holds
+        what was found before anything was fitted.
     """
     total = identification.total
     without_frame = identification.without_frame
@@ -38,6 +40,7 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
             **_mismatch(identification.mismatch),
             **_ideal_model(identification.figures.get("ideal")),
         },
+        **({} if identification.examination is None else {"check": check_part(identification.examination)}),
     }
 
 
@@ -52,7 +55,7 @@ def _observable(estimate: InertialEstimate) -> NDArray[np.bool_]:
 
 
 def _masked(covariance: NDArray[np.float64], observable: NDArray[np.bool_]) -> object:
-    return _plain(np.where(np.outer(observable, observable), covariance, np.nan))
+    return plain(np.where(np.outer(observable, observable), covariance, np.nan))
 
 
 def _estimate(estimate: InertialEstimate) -> dict[str, object]:
@@ -74,17 +77,21 @@ def _estimate(estimate: InertialEstimate) -> dict[str, object]:
 def _mismatch(mismatch: Mismatch) -> dict[str, object]:
     return {
         "verdict": mismatch.verdict,
-        "findings": [
-            {
-                "effect": finding.effect,
-                "where": _plain(finding.where),
-                "parameters": _plain(finding.parameters),
-                "evidence": _plain(finding.evidence),
-                "statement": finding.statement,
-            }
-            for finding in mismatch.findings
-        ],
-        "alternatives": _plain(mismatch.alternatives),
+        "findings": [_finding(finding) for finding in mismatch.findings],
+        "alternatives": plain(mismatch.alternatives),
+    }
+
+
+def _finding(finding: Finding) -> dict[str, object]:
+    """The contract's keys; of a fault of the set-up advice and corrected lines beside them."""
+    beside = {"advice": finding.advice, "correction": finding.correction}
+    return {
+        "effect": finding.effect,
+        "where": plain(finding.where),
+        "parameters": plain(finding.parameters),
+        "evidence": plain(finding.evidence),
+        "statement": finding.statement,
+        **{key: text for key, text in beside.items() if text},
     }
 
 
@@ -97,18 +104,3 @@ def _ideal_model(ideal: object) -> dict[str, object]:
 
 def _numbers(values: NDArray[np.float64]) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
-
-
-def _plain(value: object) -> object:
-    """Plain JSON of numpy values, tuples and mappings; what is not finite becomes None."""
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return value

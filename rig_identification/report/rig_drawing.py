@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from rig_identification.report.principal import principal_inertia
 from rig_identification.report.rest_pose import rest_pose
-from rig_identification.result import InertialEstimate
+from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -50,10 +50,18 @@ class Scene:
     center_of_mass: Array | None
     ellipsoid: Array | None  # (3, 3) columns are the semi-axes
     body_axes: tuple[Array, Array]  # origin, columns are x, y, z of body
+    marked: frozenset[str] = frozenset()  # names of cables and devices that are at fault
 
 
-def rig_scene(rig: Rig, estimate: InertialEstimate) -> Scene:
-    """Place rig, devices and inertia ellipsoid at the rest pose."""
+#: Contract's words of the devices that have a place, as they are drawn.
+DRAWN = {"imu": "IMU", "exciter": "exciter", "mocap": "markers"}
+
+
+def rig_scene(rig: Rig, estimate: InertialEstimate, faulty: frozenset[str] = frozenset()) -> Scene:
+    """Place rig, devices and inertia ellipsoid at the rest pose.
+
+    faulty: cables and devices at fault, by the contract's words.
+    """
     known = not {"cx", "cy", "cz"} & set(estimate.unobservable)
     center = estimate.values[1:4] if known else np.mean([c.body_point for c in rig.cables], axis=0)
     R_world_body, origin = rest_pose(rig, center)
@@ -61,7 +69,7 @@ def rig_scene(rig: Rig, estimate: InertialEstimate) -> Scene:
     def world(position_body: Array) -> Array:
         return np.asarray(origin + R_world_body @ position_body)
 
-    mounts = (("IMU", rig.imu), ("exciter", rig.exciter), ("markers", rig.mocap))
+    mounts = [(name, getattr(rig, device)) for device, name in DRAWN.items()]
     principal = principal_inertia(estimate)
     semi = principal.semi_axes if principal is not None and known else None
     return Scene(
@@ -70,7 +78,14 @@ def rig_scene(rig: Rig, estimate: InertialEstimate) -> Scene:
         center_of_mass=world(center) if known else None,
         ellipsoid=None if semi is None or principal is None else R_world_body @ principal.axes * semi,
         body_axes=(origin, R_world_body),
+        marked=frozenset(DRAWN.get(name, name) for name in faulty),
     )
+
+
+def described_scene(rig: Rig, faulty: frozenset[str] = frozenset()) -> Scene:
+    """The rig as described, before anything is known of the body: no centre of mass, no ellipsoid."""
+    nothing = InertialEstimate(np.full(10, np.nan), np.full((10, 10), np.nan), ELEMENTS)
+    return rig_scene(rig, nothing, faulty)
 
 
 def rig_svgs(scene: Scene) -> list[tuple[str, str]]:
@@ -109,9 +124,12 @@ def _view_svg(scene: Scene, view: View, middle: Array, scale: float) -> str:
     parts.append(f'<path class="body" d="{_outline(hinges)}"/>')
     if scene.center_of_mass is not None and scene.ellipsoid is not None:
         parts.append(_ellipse(at(scene.center_of_mass), scale * view.axes @ scene.ellipsoid))
-    parts += [_cable(name, at(a), at(b)) for name, a, b in scene.cables]
-    parts += [_device(name, at(p)) for name, p in scene.devices]
+    drawn = [(name, _cable(name, at(a), at(b))) for name, a, b in scene.cables]
+    drawn += [(name, _device(name, at(p))) for name, p in scene.devices]
+    parts += [drawing for name, drawing in drawn if name not in scene.marked]
     parts += _body_axes(scene, at)
+    # What is at fault lies on top of all else
+    parts += [f'<g class="faulty">{drawing}</g>' for name, drawing in drawn if name in scene.marked]
     if scene.center_of_mass is not None:
         parts.append(_center_mark(at(scene.center_of_mass)))
     parts.append(_scale_bar(scale))

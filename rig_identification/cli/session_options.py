@@ -1,0 +1,71 @@
+"""The options by which a command finds a session's topics, and the reading that goes with them."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig_identification.errors import InputError
+
+if TYPE_CHECKING:
+    from rig_identification.cli.progress import StageProgress
+    from rig_identification.raw import RawSession
+
+
+def add_session_options(parser: argparse.ArgumentParser) -> None:
+    """Take the session and what its topics are called."""
+    parser.add_argument(
+        "session", type=Path, metavar="SESSION", help="folder with a session.yaml, or that file"
+    )
+    parser.add_argument("--namespace", default="/rig", help="namespace of the topics (default: %(default)s)")
+    parser.add_argument(
+        "--topic",
+        type=_mapping,
+        action="append",
+        default=[],
+        metavar="NAME=TOPIC",
+        help="a topic of another name: imu/data_raw=/xsens/imu; may be repeated",
+    )
+
+
+def read_recorded(
+    path: Path, namespace: str, topics: Mapping[str, str], progress: StageProgress
+) -> RawSession:
+    """Every message of the session at ``path``.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or no bag holds a topic that ``topics`` names.
+    """
+    from rig_identification.session import read_raw
+
+    raw = read_raw(path, namespace=namespace, topics=topics, progress=watched(progress))
+    check_topics_there(raw, topics)
+    return raw
+
+
+def watched(progress: StageProgress) -> StageProgress | None:
+    """Progress on a terminal alone: where nobody watches, what cannot be used is one line and no more."""
+    return progress if progress.terminal else None
+
+
+def check_topics_there(raw: RawSession, topics: Mapping[str, str]) -> None:
+    """Refuse a mapping to a topic that is in no bag. Raises InputError."""
+    held = sorted({name for recording in raw.recordings for name in recording.listed})
+    for name, topic in topics.items():
+        if "/" + topic.lstrip("/") in held:
+            continue
+        near = difflib.get_close_matches(topic, held, n=1)
+        hint = f"did you mean {near[0]}" if near else f"they hold {', '.join(held) or 'none'}"
+        raise InputError(f"--topic {name}={topic}: no bag holds {topic}; {hint}")
+
+
+def _mapping(text: str) -> tuple[str, str]:
+    name, equals, topic = text.partition("=")
+    if not (name and equals and topic):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=TOPIC, as in imu/data_raw=/xsens/imu")
+    return name, topic

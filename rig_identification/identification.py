@@ -1,0 +1,97 @@
+"""The use case under every front end: a session as recorded is examined, corrected, identified and told.
+
+Command line and nodes read the bags, hand them on, and say what comes out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from rig_identification.check.examine import examine
+from rig_identification.errors import InputError
+from rig_identification.examination import Examination, SetupFault
+from rig_identification.raw import RawSession
+from rig_identification.recording import Session
+from rig_identification.result import Finding, Identification, Mismatch
+from rig_identification.session import clean
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A session ready to be identified, and what was wrong with it before."""
+
+    session: Session  # corrected and cleaned
+    examination: Examination
+
+
+def prepare(raw: RawSession, progress: Callable[[str], None] | None = None) -> Prepared:
+    """Examine a session, undo the faults that can be undone, and choose the usable samples.
+
+    progress: called with one sentence before each stage of the examination.
+
+    Raises
+    ------
+    InputError
+        What is left cannot be used; the line names the faults that were found too.
+    """
+    examined = examine(raw, progress)
+    try:
+        return Prepared(clean(examined.session), examined.examination)
+    except InputError as error:
+        if not examined.examination.faults:
+            raise
+        found = " ".join(fault_text(fault) for fault in examined.examination.faults)
+        raise InputError(f"{error}. Found before: {found}") from error
+
+
+def identify_prepared(prepared: Prepared, progress: Progress | None = None) -> Identification:
+    """Identify the body, and tell the faults of the set-up with what the fit found.
+
+    Raises InputError where the session holds nothing to fit.
+    """
+    from rig_identification.mismatch import identify  # compiles: not before a session is there
+
+    return with_examination(identify(prepared.session, progress=progress), prepared.examination)
+
+
+def with_examination(found: Identification, examination: Examination) -> Identification:
+    """The answer with the set-up's faults as its first findings, ties as alternatives, warnings as notes."""
+    return replace(
+        found,
+        mismatch=_with_faults(found.mismatch, examination.faults),
+        notes=(*examination.warnings, *examination.notes, *found.notes),
+        examination=examination,
+    )
+
+
+def fault_text(fault: SetupFault) -> str:
+    """What is wrong, what to do, and the corrected lines, as one line."""
+    lines = "; ".join(line.strip() for line in fault.correction.splitlines() if line.strip())
+    return " ".join(filter(None, [fault.statement, fault.advice, f"Corrected: {lines}." if lines else ""]))
+
+
+def _with_faults(mismatch: Mismatch, faults: tuple[SetupFault, ...]) -> Mismatch:
+    """All is noise once the faults are undone: explained, and not none."""
+    if not faults:
+        return mismatch
+    count = "One fault" if len(faults) == 1 else f"{len(faults)} faults"
+    was = "was" if len(faults) == 1 else "were"
+    ties = tuple(dict(alternative) for fault in faults for alternative in fault.alternatives)
+    return Mismatch(
+        verdict="explained" if mismatch.verdict == "none" else mismatch.verdict,
+        explanation=f"{count} of the set-up {was} found before anything was fitted. {mismatch.explanation}",
+        findings=(*map(_finding, faults), *mismatch.findings),
+        alternatives=(*ties, *mismatch.alternatives),
+    )
+
+
+def _finding(fault: SetupFault) -> Finding:
+    """A fault in the contract's form. Held-out errors are not known: nothing is fitted without correction."""
+    evidence = {"log_likelihood_gain": fault.gain, "holdout_error_before": None, "holdout_error_after": None}
+    return Finding(
+        fault.effect, dict(fault.where), dict(fault.parameters), evidence, fault_text(fault), fault.advice,
+        fault.correction,
+    )  # fmt: skip

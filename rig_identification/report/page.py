@@ -1,0 +1,19 @@
+"""What every page shares: templates that escape each name, and one style."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+
+def page_environment() -> tuple[Environment, Markup]:
+    """Templates of this package, and the style sheet that a page holds in itself."""
+    environment = Environment(
+        loader=PackageLoader("rig_identification.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    style = environment.loader.get_source(environment, "style.css")[0] if environment.loader else ""
+    return environment, Markup(style)
