@@ -69,8 +69,9 @@ def with_examination(found: Identification, examination: Examination) -> Identif
 
 def fault_text(fault: SetupFault) -> str:
     """What is wrong, what to do, and the corrected lines, as one line."""
-    lines = "; ".join(line.strip() for line in fault.correction.splitlines() if line.strip())
-    return " ".join(filter(None, [fault.statement, fault.advice, f"Corrected: {lines}." if lines else ""]))
+    lines = [line.strip() for line in fault.correction.splitlines() if line.strip()]
+    joined = "; ".join(lines).replace(":; ", ": ")  # a heading and what stands below it
+    return " ".join(filter(None, [fault.statement, fault.advice, f"Corrected: {joined}." if lines else ""]))
 
 
 def _with_faults(mismatch: Mismatch, faults: tuple[SetupFault, ...]) -> Mismatch:
