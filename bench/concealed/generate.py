@@ -46,9 +46,9 @@ def make_session(
     ideal = draw_scene(seed, duration)
     if any(e.aside for e in chosen):
         ideal = released_aside(ideal)
-    ideal, paths = _calm_scene(ideal)
+    ideal, paths = calm_scene(ideal)
     effects = draw_effects(rng, chosen, ideal, size)
-    scene, altered, effects = _with_effects(ideal, paths, effects)
+    scene, altered, effects = with_effects(ideal, paths, effects)
     with_shaft = bool(np.random.default_rng([seed, 4]).random() < 0.5)
     recordings = tuple(
         record(path, scene, effects, plan, k, with_shaft)
@@ -65,7 +65,7 @@ def make_session(
     return session, truth
 
 
-def _with_effects(
+def with_effects(
     ideal: Scene, paths: list[Trajectory], effects: list[Effect]
 ) -> tuple[Scene, list[Trajectory], list[Effect]]:
     """The scene and its motion with the effects in it, made stronger until each shows."""
@@ -102,7 +102,7 @@ def _released(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Engine:
     return engine
 
 
-def _calm_scene(scene: Scene) -> tuple[Scene, list[Trajectory]]:
+def calm_scene(scene: Scene) -> tuple[Scene, list[Trajectory]]:
     """Scale each run until its cables stay clear of slack and its motion is worth recording."""
     plans, paths = [], []
     for plan in scene.plans:
