@@ -184,6 +184,20 @@ def test_parts_at_fault_are_found_wherever_the_fault_names_them() -> None:
     assert faulty_parts(make_examination(), make_rig()) == {"cable_2"}
 
 
+@pytest.mark.parametrize(
+    ("channel", "parts"),
+    [
+        ("cable_1, cable_3", {"cable_1", "cable_3"}),
+        ("cables", {"cable_1", "cable_2", "cable_3"}),
+        ("all", {"cable_1", "cable_2", "cable_3", "imu", "inclinometer", "exciter", "mocap"}),
+        ("ceiling", set()),
+    ],
+)
+def test_one_channel_may_stand_for_several_devices(channel: str, parts: set[str]) -> None:
+    fault = make_fault(where={"channel": channel}, parameters={})
+    assert faulty_parts(make_examination(faults=(fault,)), make_rig()) == parts
+
+
 def test_what_is_at_fault_is_red_in_every_view() -> None:
     rig = make_rig()
     for faulty in ({"cable_2"}, {"imu"}, {"mocap", "cable_1"}, set()):

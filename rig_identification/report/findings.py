@@ -142,6 +142,8 @@ def place_text(key: str, value: object) -> str:
         return "(" + ", ".join(number(float(v), 2) for v in value) + ") m in body"
     if isinstance(value, (list, tuple)):
         return ", ".join(str(item) for item in value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name}: {item}" for name, item in value.items())
     return str(value)
 
 

@@ -13,6 +13,9 @@ from rig_identification.rig import Rig
 
 #: Beyond this many standard deviations a reading at rest is not as described (0.3 % of sound ones by chance).
 FAR = 3.0
+#: What a fault's ``channel`` says where it is in every device, or in every load cell.
+_ALL = "all"
+_ALL_CELLS = frozenset({"cables", "all_cells", "load_cells"})
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,7 @@ class SetupView:
     """The whole set-up, written out."""
 
     headline: str
+    short: str  # faults and warnings, counted
     faults: list[FaultView]
     warnings: tuple[str, ...]
     rest: list[RestView]
@@ -87,6 +91,7 @@ def setup_view(examination: Examination) -> SetupView:
     rest, used = rest_views(examination), sum(topic.used for topic in examination.topics)
     return SetupView(
         headline=headline(examination),
+        short=", ".join(filter(None, counts(examination))),
         faults=fault_views(examination),
         warnings=examination.warnings,
         rest=rest,
@@ -97,12 +102,18 @@ def setup_view(examination: Examination) -> SetupView:
     )
 
 
+def counts(examination: Examination) -> tuple[str, str]:
+    """Faults and warnings, counted in words; "" where there are none."""
+    pairs = (("fault", len(examination.faults)), ("warning", len(examination.warnings)))
+    faults, warnings = (f"{n} {word}{'s' if n > 1 else ''}" if n else "" for word, n in pairs)
+    return faults, warnings
+
+
 def headline(examination: Examination) -> str:
-    """Faults and warnings, counted."""
-    faults, warnings = len(examination.faults), len(examination.warnings)
-    told = f"{faults} fault{'s' if faults != 1 else ''}" if faults else "No fault"
-    more = f", {warnings} warning{'s' if warnings != 1 else ''}" if warnings else ""
-    return f"{told} of the set-up {'were' if faults > 1 else 'was'} found{more}."
+    """One sentence on faults and warnings."""
+    faults, warnings = counts(examination)
+    told = f"{faults or 'No fault'} of the set-up {'were' if len(examination.faults) > 1 else 'was'} found"
+    return f"{told}{f', {warnings}' if warnings else ''}."
 
 
 def fault_views(examination: Examination) -> list[FaultView]:
@@ -122,15 +133,19 @@ def topic_views(examination: Examination) -> list[tuple[str, list[TopicView]]]:
 
 
 def faulty_parts(examination: Examination, rig: Rig) -> frozenset[str]:
-    """Cables and devices that a fault names, by the contract's words."""
-    known = {cable.name for cable in rig.cables} | {"imu", "inclinometer", "exciter", "mocap"}
+    """Cables and devices that a fault names, by the contract's words, one by one or as all of them."""
+    cables = {cable.name for cable in rig.cables}
+    known = cables | {"imu", "inclinometer", "exciter", "mocap"}
     named = {word for fault in examination.faults for word in _words_in((fault.where, fault.parameters))}
-    return frozenset(known & named)
+    if named & _ALL_CELLS:
+        named |= cables
+    return frozenset(known if _ALL in named else known & named)
 
 
 def _words_in(value: object) -> Iterator[str]:
+    """Words of a value, and of what it holds; several names stand in one text with commas."""
     if isinstance(value, str):
-        yield value
+        yield from value.split(", ")
     elif isinstance(value, Mapping):
         for item in value.values():
             yield from _words_in(item)
