@@ -86,6 +86,7 @@ class Recording:
     mocap: Series | None = None  # (n, 7) position m, quaternion xyzw of marker frame in tracker frame
     ground_truth: Series | None = None  # (n, 13) position, quaternion xyzw of body in world; body twist
     quality: tuple[ChannelQuality, ...] = ()
+    notes: tuple[str, ...] = ()  # sentences on how the bag was read, for the report
 
 
 @dataclass(frozen=True)

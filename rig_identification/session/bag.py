@@ -1,115 +1,93 @@
-"""Serialized messages of a rosbag2 folder, taken in bulk.
+"""Serialized messages of a bag as it comes, taken in bulk.
 
-rosbags reads the metadata and decompresses files. Its message iterator makes several Python objects a
-message, so the storages' messages are taken by :mod:`.mcap_storage` and :mod:`.sqlite3_storage`.
+rosbags' message iterator makes several Python objects a message, and wants a bag that was closed in order.
+So the files are read here, from beginning to end: :mod:`.mcap_storage`, :mod:`.sqlite3_storage` and
+:mod:`.rosbag1_storage`. What cannot be read of them is said.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-from rosbags.interfaces import Connection
-from rosbags.rosbag2.reader import DirectoryReader
-from rosbags.rosbag2.storage_mcap import McapReader
 
 from rig_identification.errors import InputError
-from rig_identification.session.fields import one_line
+from rig_identification.session.bag_files import BagFiles, bag_files, opened
+from rig_identification.session.contents import Contents
+from rig_identification.session.fields import close_match, one_line
 from rig_identification.session.mcap_storage import collect_mcap
-from rig_identification.session.raw_topic import Collector, RawTopic
-from rig_identification.session.sqlite3_storage import Sqlite3Topics, collect_sqlite3
+from rig_identification.session.raw_topic import RawTopic
+from rig_identification.session.rosbag1_storage import collect_rosbag1
+from rig_identification.session.sqlite3_storage import collect_sqlite3
 
-if sys.version_info >= (3, 14):
-    from compression import zstd
-else:
-    from backports import zstd
-
-
-class _Folder(DirectoryReader):
-    """rosbags' reader of bag folders; its own sqlite3 storage counts every message before it opens."""
-
-    STORAGE_PLUGINS: dict[str, Any] = {"mcap": McapReader, "sqlite3": Sqlite3Topics}  # noqa: RUF012
+_READERS: dict[str, Callable[[Path, Contents], list[str]]] = {
+    "mcap": collect_mcap,
+    "sqlite3": collect_sqlite3,
+    "rosbag1": collect_rosbag1,
+}
 
 
 @dataclass(frozen=True)
 class Bag:
-    """A rosbag2 folder in memory: what it lists, and the wanted topics' messages."""
+    """A bag in memory: what it lists, and the wanted topics' messages."""
 
-    folder: Path
+    folder: Path  # or the one file that was given
     listed: dict[str, str]  # every topic of the bag -> its message type
     topics: dict[str, RawTopic]
-    counts: dict[str, int]  # every topic of the bag -> its messages by metadata.yaml
+    counts: dict[str, int]  # every topic of the bag -> its messages
+    notes: tuple[str, ...] = ()  # sentences on what could not be read, or was read in an uncommon way
 
 
-def read_bag(folder: Path, wanted: Collection[str]) -> Bag:
-    """Read the messages of the topics ``wanted`` that the bag in ``folder`` lists.
+def read_bag(path: Path, wanted: Collection[str]) -> Bag:
+    """Read the messages of the topics ``wanted`` of the bag at ``path``, a folder or a file of it.
 
     Raises
     ------
     InputError
-        No such folder, no metadata.yaml, a damaged or truncated bag, or one topic with two types.
+        Nothing there, a bag of which nothing can be read, or one topic with two types.
     """
-    if folder.is_file():
-        raise InputError(f"{folder}: is a file; give the bag's folder, which holds metadata.yaml too")
-    if not folder.is_dir():
-        raise InputError(f"{folder}: bag does not exist; correct its path in session.yaml or copy it there")
-    if not (folder / "metadata.yaml").is_file():
-        raise InputError(f"{folder}: metadata.yaml is missing; copy it or run 'ros2 bag reindex'")
-    reader = _Folder(folder)
+    if not path.exists():
+        beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise InputError(
+            f"{path}: bag does not exist; correct its path in session.yaml or copy it there"
+            f"{close_match(path.name, beside)}"
+        )
     try:
-        reader.open()
-        try:
-            return _read(folder, reader, wanted)
-        finally:
-            reader.close()
+        return _read(path, bag_files(path), wanted)
     except InputError:
         raise
-    except MemoryError as err:  # a damaged length asks for any amount
-        raise InputError(
-            f"{folder}: bag is damaged, or larger than this machine's memory; copy it again"
-        ) from err
+    except MemoryError as err:
+        raise InputError(f"{path}: bag is larger than this machine's memory; split it") from err
     except Exception as err:  # a damaged file fails in as many ways as there are parsers
-        reason = one_line(err) or type(err).__name__
-        raise InputError(
-            f"{folder}: bag is damaged or truncated ({reason}); copy it again or record anew"
-        ) from err
+        raise _useless(path, one_line(err) or type(err).__name__) from err
 
 
-def _read(folder: Path, reader: DirectoryReader, wanted: Collection[str]) -> Bag:
-    listed: dict[str, str] = {}
-    for connection in reader.connections:
-        if listed.setdefault(connection.topic, connection.msgtype) != connection.msgtype:
-            raise InputError(f"{folder}: {connection.topic}: recorded with two types; keep one publisher")
-    chosen = [connection for connection in reader.connections if connection.topic in wanted]
-    collector = Collector(zstd.decompress if reader.metadata.compression_mode == "message" else None)
-    _collect(reader, {connection.topic for connection in chosen}, collector)
-    _check_complete(folder, chosen, collector)
-    counts = dict.fromkeys(listed, 0)
-    for connection in reader.connections:
-        counts[connection.topic] += connection.msgcount
-    topics = {name: collector.take(name, listed[name]) for name in listed if name in wanted}
-    return Bag(folder, listed, topics, counts)
+def _useless(path: Path, reason: str) -> InputError:
+    return InputError(f"{path}: bag is damaged or truncated ({reason}); copy it again or record anew")
 
 
-def _collect(reader: DirectoryReader, topics: set[str], collector: Collector) -> None:
-    for storage in reader.storages:
-        names = {item.id: item.topic for item in storage.connections if item.topic in topics}
-        path = Path(str(storage.path))  # type: ignore[attr-defined]
-        if isinstance(storage, McapReader):
-            collect_mcap(path, names, collector)
-        else:
-            collect_sqlite3(path, names, collector)
+def _read(path: Path, found: BagFiles, wanted: Collection[str]) -> Bag:
+    contents = Contents(path, wanted)
+    notes = list(found.notes)
+    of_files = [note for file in found.files for note in _read_file(file, found.metadata.storage, contents)]
+    messages = sum(contents.counts.values())
+    if of_files and not messages:
+        raise _useless(path, of_files[0])
+    if messages < found.metadata.messages:
+        notes.append(f"{messages} messages were read of the {found.metadata.messages} in metadata.yaml")
+    order = dict.fromkeys((*found.metadata.topics, *contents.listed))
+    listed = {name: contents.listed.get(name) or found.metadata.topics[name] for name in order}
+    topics = {name: contents.take(name, listed[name]) for name in listed if name in wanted}
+    counts = {name: contents.counts.get(name, 0) for name in listed}
+    return Bag(path, listed, topics, counts, (*notes, *of_files))
 
 
-def _check_complete(folder: Path, chosen: list[Connection], collector: Collector) -> None:
-    """A file that was cut off may still open: metadata.yaml tells how much it held."""
-    for name in {connection.topic for connection in chosen}:
-        promised = sum(connection.msgcount for connection in chosen if connection.topic == name)
-        if collector.counts[name] < promised:
-            raise InputError(
-                f"{folder}: {name}: {collector.counts[name]} messages of the {promised} in metadata.yaml; "
-                "the bag is truncated: copy it again or run 'ros2 bag reindex'"
-            )
+def _read_file(file: Path, storage: str | None, contents: Contents) -> list[str]:
+    """Read one file; what is to be said of it, in whole sentences."""
+    with opened(file) as (inner, kind, notes):
+        if kind not in _READERS:
+            return [f"{file.name} is damaged or truncated: it does not begin as a bag's file"]
+        if storage not in (None, kind):
+            notes.append(f"is read as {kind} by its first bytes; metadata.yaml says {storage or 'nothing'!r}")
+        notes += _READERS[kind](inner, contents)
+    return [f"{file.name} {note}" for note in notes]

@@ -106,16 +106,12 @@ def raw_channel(raw: RawTopic, topic: Topic, where: str) -> RawChannel:
     Raises
     ------
     InputError
-        Wrong message type, no message, or one that does not deserialize.
+        Wrong message type, or a message that does not deserialize.
     """
     if raw.message_type != topic.message_type:
         raise InputError(
             f"{where}: {topic.name}: type is {raw.message_type}, not {topic.message_type}; "
             "record the contract's type or map the topic to another"
-        )
-    if raw.count == 0:
-        raise InputError(
-            f"{where}: {topic.name}: topic is empty, 0 messages; record it or leave the topic out of the bag"
         )
     try:
         stamp_ns, decoded = decode(raw)

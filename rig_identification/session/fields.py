@@ -15,6 +15,10 @@ from ruamel.yaml.error import YAMLError
 
 from rig_identification.errors import InputError
 
+#: Share of letters alike, as difflib counts them, from which a word is taken for another one misspelt: two
+#: letters swapped or one wrong in a word of five.
+CLOSE = 0.75
+
 #: A quaternion further than this from norm 1 is a typing error, not rounding.
 QUATERNION_NORM_TOLERANCE = 1e-3
 
@@ -22,6 +26,13 @@ QUATERNION_NORM_TOLERANCE = 1e-3
 def one_line(text: object) -> str:
     """``text`` on one line, for messages that quote another library."""
     return " ".join(str(text).split())
+
+
+def close_match(word: str, known: Iterable[str]) -> str:
+    """Ending of a message that names the word of ``known`` that ``word`` may be misspelt from, or nothing."""
+    by_lower = {name.lower(): name for name in known}
+    close = get_close_matches(word.lower(), by_lower, n=1, cutoff=CLOSE)
+    return f"; did you mean {by_lower[close[0]]}?" if close else ""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,24 +49,15 @@ def slices(buffer: Bytes, starts: Integers, length: int) -> Bytes:
 
 
 class Collector:
-    """Gathers messages by topic and length, in the order of the file.
+    """Gathers messages by topic and length, in the order of the file."""
 
-    Parameters
-    ----------
-    unpack : callable, optional
-        Decompresses one message.
-    """
-
-    def __init__(self, unpack: Callable[[bytes], bytes] | None = None) -> None:
+    def __init__(self) -> None:
         self.counts: dict[str, int] = defaultdict(int)
-        self._unpack = unpack
         self._received: dict[str, list[Integers]] = defaultdict(list)
         self._pieces: dict[str, dict[int, list[MessageBlock]]] = defaultdict(lambda: defaultdict(list))
 
     def add(self, topic: str, received_ns: ArrayLike, messages: Sequence[bytes]) -> None:
         """Add ``messages``."""
-        if self._unpack:
-            messages = list(map(self._unpack, messages))
         lengths = np.fromiter(map(len, messages), np.int64, len(messages))
         for length in distinct(lengths):
             chosen = np.flatnonzero(lengths == length)
@@ -79,11 +70,6 @@ class Collector:
     ) -> None:
         """Add the messages ``buffer[start:end]``."""
         first, behind = np.asarray(starts), np.asarray(ends)
-        if self._unpack:
-            raw = buffer.tobytes()
-            bounds = zip(first.tolist(), behind.tolist(), strict=True)
-            self.add(topic, received_ns, [raw[start:end] for start, end in bounds])
-            return
         lengths = behind - first
         for length in distinct(lengths):
             chosen = np.flatnonzero(lengths == length)

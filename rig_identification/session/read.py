@@ -20,7 +20,14 @@ from rig_identification.session.channel import Channel, clean_channel, raw_chann
 from rig_identification.session.rest import check_rest
 from rig_identification.session.rig_description import read_rig
 from rig_identification.session.session_description import BagEntry, read_session_description
-from rig_identification.session.topics import DEFAULT_NAMESPACE, Topic, expected_topics, foreign_cable
+from rig_identification.session.topics import (
+    DEFAULT_NAMESPACE,
+    Topic,
+    check_mapped,
+    expected_topics,
+    foreign_cable,
+    other_namespace,
+)
 
 #: A dynamic run must last this long to tell anything.
 SHORTEST_RUN = 1.0  # s
@@ -69,7 +76,10 @@ def read_raw(
     Raises
     ------
     InputError
-        The first thing that cannot be read, as one line: where, what, which value, what to do.
+        The first thing that cannot be read, as one line: where, what, which value, what to do. A topic that
+        ``topics`` names and no bag holds is one.
+    MissingDescription
+        Bags without a session.yaml, with the text of one to edit.
     """
     description = read_session_description(Path(path))
     rig = read_rig(description.rig_file)
@@ -79,6 +89,7 @@ def read_raw(
         if progress is not None:
             progress(f"reading {entry.name}")
         recordings.append(_read_raw(entry, expected))
+    check_mapped(topics or {}, expected, [recording.listed for recording in recordings])
     name = description.file.resolve().parent.name
     return RawSession(name, rig, tuple(recordings), namespace)
 
@@ -98,21 +109,37 @@ def clean(raw: RawSession) -> Session:
 
 def _read_raw(entry: BagEntry, expected: dict[str, Topic]) -> RawRecording:
     bag = read_bag(entry.folder, expected)
-    channels = tuple(
+    empty = [name for name, topic in bag.topics.items() if not topic.count]
+    # A wrong type is told of an empty topic too: its messages would be of no use.
+    channels = [
         raw_channel(bag.topics.pop(name), expected[name], str(bag.folder)) for name in list(bag.topics)
-    )
+    ]
+    notes = [*bag.notes, *(f"{name} has no message: taken as not recorded" for name in empty)]
     return RawRecording(
-        name=entry.name, kind=entry.kind, holdout=entry.holdout, where=str(bag.folder), channels=channels,
+        name=entry.name, kind=entry.kind, holdout=entry.holdout, where=str(bag.folder),
+        channels=tuple(channel for channel in channels if channel.topic not in empty),
         listed=bag.listed, counts=bag.counts, dummy=entry.dummy,
+        notes=tuple(f"{entry.name}: {note}" for note in notes),
     )  # fmt: skip
 
 
 def _cleaned(raw: RawRecording, rig: Rig, namespace: str) -> Recording:
+    """One recording; what cannot be used of a bag that was not read whole is told with how it was read."""
+    try:
+        return _usable(raw, rig, namespace)
+    except InputError as err:
+        if not raw.notes:
+            raise
+        raise InputError(f"{err} ({'; '.join(raw.notes)})") from err
+
+
+def _usable(raw: RawRecording, rig: Rig, namespace: str) -> Recording:
     channels = [clean_channel(channel, raw.where) for channel in raw.channels]
     if all(channel.topic.channel == "ground_truth" for channel in channels):
         known = ", ".join(sorted(raw.listed)) or "none"
         raise InputError(
             f"{raw.where}: no topic of the contract in the bag; it has {known}: map the topics or namespace"
+            f"{other_namespace(raw.listed, rig, namespace)}"
         )
     together, apart = _on_one_clock(channels)
     start_ns = min(int(channel.ordered_ns[0]) for channel in together)
@@ -188,7 +215,8 @@ def _recording(
             tension[channel.topic.cable] = series
     return Recording(
         name=raw.name, kind=raw.kind, holdout=raw.holdout, start_ns=start_ns, duration=duration,
-        dummy=raw.dummy, tension=tension, exciter_unmeasured=unmeasured, quality=quality, **others,
+        dummy=raw.dummy, tension=tension, exciter_unmeasured=unmeasured, quality=quality, notes=raw.notes,
+        **others,
     )  # fmt: skip
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from rig_identification.errors import InputError
+from rig_identification.rig import Rig
+from rig_identification.session.fields import close_match
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 DEFAULT_NAMESPACE = "/rig"
@@ -62,7 +64,10 @@ def expected_topics(
     for key, bag_name in (renamed or {}).items():
         short = key.strip("/").removeprefix(DEFAULT_NAMESPACE.strip("/") + "/")
         if short not in contract:
-            raise InputError(f"topic mapping: {key} is no topic of this rig; known are {', '.join(contract)}")
+            raise InputError(
+                f"topic mapping: {key} is no topic of this rig; known are {', '.join(contract)}"
+                f"{close_match(short, contract)}"
+            )
         names[short] = bag_name if bag_name.startswith("/") else f"/{bag_name}"
     topics = {names[name]: Topic(names[name], *contract[name]) for name in contract}
     if len(topics) < len(contract):
@@ -79,3 +84,36 @@ def foreign_cable(name: str, namespace: str = DEFAULT_NAMESPACE) -> str | None:
     if name.startswith(prefix) and len(parts) == 2 and parts[1] == "wrench" and parts[0] not in DEVICES:
         return parts[0]
     return None
+
+
+def check_mapped(
+    renamed: Mapping[str, str], expected: Mapping[str, Topic], listed: Iterable[Mapping[str, str]]
+) -> None:
+    """Refuse a mapping to a topic that no bag holds: who names a topic wants it used.
+
+    renamed: as given to :func:`expected_topics`. listed: for each bag, every topic and its type.
+
+    Raises
+    ------
+    InputError
+        Names the topics of the right type that are there.
+    """
+    held = {name: kind for bag in listed for name, kind in bag.items()}
+    for key, given in renamed.items():
+        name = given if given.startswith("/") else f"/{given}"
+        if name in held:
+            continue
+        kind = expected[name].message_type
+        alike = sorted(other for other, its in held.items() if its == kind)
+        there = f"of type {kind} they hold {', '.join(alike)}" if alike else f"none holds a {kind}"
+        raise InputError(
+            f"--topic {key}={given}: no bag holds {name}; {there}{close_match(name, alike or held)}"
+        )
+
+
+def other_namespace(listed: Iterable[str], rig: Rig, namespace: str) -> str:
+    """Ending of a message that names the namespace under which the contract's topics are, or nothing."""
+    endings = [f"/{cable.name}/wrench" for cable in rig.cables] + [f"/{name}" for name in FIXED_TOPICS]
+    found = {name.removesuffix(end) for name in listed for end in endings if name.endswith(end)}
+    others = sorted(found - {"/" + namespace.strip("/")})
+    return f"; did you mean --namespace {others[0] or '/'}?" if others else ""
