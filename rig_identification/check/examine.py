@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rig_identification.check import readings, stamps
+from rig_identification.check import consistency, readings, stamps
+from rig_identification.check.consistency.judge import judged
+from rig_identification.check.consistency.rest_readings import readings_at_rest
 from rig_identification.check.found import examiners
 from rig_identification.check.inventory import inventory
 from rig_identification.check.left_aside import left_aside
-from rig_identification.examination import Examination, RestReading, SetupFault
+from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
 
 
@@ -24,15 +26,20 @@ class Examined:
 def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> Examined:
     """Examine a session. progress: called with one sentence before each stage."""
     session, faults = raw, list[SetupFault]()
-    for stage, package in (("stamps", stamps), ("readings", readings)):
+    for stage, package in (("stamps", stamps), ("readings", readings), ("copies", consistency)):
         if progress is not None:
             progress(f"checking {stage}")
         for examiner in examiners(package):
             for found in examiner.find(session):
                 session = found.session
                 faults.append(found.fault)
-    rest = tuple[RestReading, ...]()
-    # Channels against each other and against the description go here; they also give the readings at rest.
+    if progress is not None:
+        progress("checking how channels agree")
+    verdict = judged(session)
+    for found in verdict.found:
+        session = found.session
+        faults.append(found.fault)
+    rest = readings_at_rest(verdict.evidence) if verdict.evidence is not None else ()
     topics = inventory(raw, session)
     aside = left_aside(raw, session, topics)
     notes = (*raw.notes, *(note for recording in raw.recordings for note in recording.notes), *aside.notes)

@@ -7,7 +7,7 @@ import pkgutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Protocol, cast
+from typing import Any, Protocol
 
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawSession
@@ -24,7 +24,7 @@ class Found:
 
 
 class Examiner(Protocol):
-    """A module of ``check/stamps`` or ``check/readings``: one kind of fault that channels show by themselves."""
+    """A module of ``check/stamps`` or ``check/readings``: one kind of fault that a channel shows by itself."""
 
     ORDER: int  # examiners run by rising order, each on the session that those before it corrected
 
@@ -33,9 +33,13 @@ class Examiner(Protocol):
         ...
 
 
-def examiners(package: ModuleType) -> Iterator[Examiner]:
-    """Every module of a package that has ``find``, by its ``ORDER``. A file in the folder is registered by that."""
+def modules_with(package: ModuleType, name: str) -> list[Any]:
+    """Modules of a package that define ``name``, by their file's name: a file in the folder is registered."""
     names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-    modules = [importlib.import_module(f"{package.__name__}.{name}") for name in names]
-    chosen = [cast(Examiner, module) for module in modules if hasattr(module, "find")]
-    return iter(sorted(chosen, key=lambda module: module.ORDER))
+    modules = [importlib.import_module(f"{package.__name__}.{one}") for one in names]
+    return [module for module in modules if hasattr(module, name)]
+
+
+def examiners(package: ModuleType) -> Iterator[Examiner]:
+    """Every module of a package that has ``find``, by its ``ORDER``."""
+    return iter(sorted(modules_with(package, "find"), key=lambda module: module.ORDER))

@@ -1,0 +1,151 @@
+"""How well a session hangs together: one number in nats from rest, motion and forces.
+
+The same number without a device bounds what any hypothesis about that device can gain. Families of
+hypotheses that cannot gain their price are not tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rig_identification.check.consistency.forces import ForceModel
+from rig_identification.check.consistency.hypothesis import Hypothesis
+from rig_identification.check.consistency.motion import MotionFit, MotionModel
+from rig_identification.check.consistency.reduced import Reduced, ReducedSession
+from rig_identification.check.consistency.rest import Loosened, RestFit, fit_rest, square_with
+from rig_identification.check.consistency.tracker import TrackerModel
+from rig_identification.rig import Rig
+
+#: Runs looked at: a fault of the set-up shows in any.
+RUNS = 1
+#: Devices whose readings tell how the body moves.
+MOVING = frozenset(["imu", "imu.gyroscope", "imu.accelerometer", "inclinometer"])
+#: Nats below which readings at rest agree: less than any fault costs.
+PRICELESS = 9.0
+
+
+@dataclass(frozen=True)
+class Account:
+    """One evaluation."""
+
+    rest: RestFit | None
+    motions: tuple[MotionFit, ...]
+    cost: float  # nats by which the session fails to hang together
+    parts: Mapping[str, float]
+
+
+@dataclass
+class Evidence:
+    """Evaluations of one session under hypotheses."""
+
+    session: ReducedSession
+    readings: int = field(init=False)
+    _without: dict[frozenset[str], Account] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.plain = self.account(self.session)
+
+    @property
+    def cells(self) -> frozenset[str]:
+        """Names of all cables."""
+        return frozenset(c.name for c in self.session.rig.cables)
+
+    def without(self, devices: frozenset[str]) -> Account:
+        """The session without some devices' readings; ``imu.gyroscope`` stands for one half of an IMU."""
+        if devices not in self._without:
+            recordings = tuple(_lacking(r, devices) for r in self.session.recordings)
+            lacking = ReducedSession(self.session.rig, recordings)
+            self._without[devices] = self.account(lacking, self.plain)
+        return self._without[devices]
+
+    def bound(self, devices: frozenset[str]) -> float:
+        """Nats that a hypothesis about these devices can gain at most. "rest": what rest disagrees by."""
+        if "rest" in devices:
+            return self.plain.parts.get("rest", 0.0)
+        return self.plain.cost - self.without(devices).cost
+
+    def judged(self, hypothesis: Hypothesis, thorough: bool = False) -> Account:
+        """The session under a hypothesis; not thorough: to first order about the session without its devices."""
+        changed = hypothesis.change.reduced(self.session)
+        fresh = thorough or hypothesis.fresh
+        start = None if fresh else self.without(hypothesis.about)
+        if start is None or start.rest is None:
+            return self._account(changed, hypothesis.loosened, self.plain)
+        devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
+        recordings = changed.at_rest
+        if hypothesis.about == {"imu.gyroscope"}:
+            square = self.plain.rest.square if self.plain.rest else start.rest.square
+        else:
+            square = square_with(start.rest, changed.rig, recordings, devices, hypothesis.loosened)
+        parts = {"rest": self._rest_nats(square)}
+        for k, run in enumerate(changed.runs[:RUNS]):
+            motion = start.motions[k]
+            if hypothesis.about & MOVING:
+                model = MotionModel(changed.rig, run, *start.rest.poses[0])
+                motion = model.once(run.values, motion.trajectory)
+            parts |= _parts(changed.rig, run, self._body(start), motion)
+        return Account(start.rest, start.motions, float(sum(parts.values())), parts)
+
+    def _body(self, start: Account) -> RestFit:
+        """The body at rest by all readings where they agree, else by those that a hypothesis leaves alone."""
+        assert start.rest is not None
+        agree = self.plain.rest is not None and self.plain.parts["rest"] < PRICELESS
+        return self.plain.rest if agree and self.plain.rest is not None else start.rest
+
+    def _rest_nats(self, square: float) -> float:
+        return 0.5 * self.readings * float(np.log1p(square / self.readings))
+
+    def account(self, session: ReducedSession, begun: Account | None = None) -> Account:
+        """Evaluate a session from scratch; begun: another account whose motions are tried as starts too."""
+        return self._account(session, None, begun)
+
+    def _account(
+        self, session: ReducedSession, loosened: Loosened | None, begun: Account | None = None
+    ) -> Account:
+        rest = fit_rest(session.rig, session.at_rest, loosened)
+        if rest is None:
+            return Account(None, (), float("inf"), {})
+        if not hasattr(self, "readings"):
+            self.readings = max(rest.readings, 1)
+        parts = {"rest": self._rest_nats(rest.square)}
+        motions = []
+        for k, run in enumerate(session.runs[:RUNS]):
+            model = MotionModel(session.rig, run, *rest.poses[0])
+            tried = [model.settled(run.values)]
+            if begun is not None and begun.motions:
+                tried.append(model.settled(run.values, begun.motions[k].trajectory))
+            motion = min(tried, key=lambda fit: fit.total)
+            motions.append(motion)
+            parts |= _parts(session.rig, run, rest, motion)
+        return Account(rest, tuple(motions), float(sum(parts.values())), parts)
+
+
+def _parts(rig: Rig, run: Reduced, rest: RestFit, motion: MotionFit) -> dict[str, float]:
+    """Nats of one run's motion, forces and tracker."""
+    parts = {f"{run.name}.{name}": value for name, value in motion.cost.items()}
+    told = bool({"gyroscope", "accelerometer"} & motion.cost.keys())
+    if told:
+        parts[f"{run.name}.forces"] = ForceModel(rig, motion.trajectory, rest).cost(run.values)[0]
+    if "mocap" in run.values:
+        known = motion.trajectory if {"gyroscope", "accelerometer"} <= motion.cost.keys() else None
+        tracker = TrackerModel(rig, *rest.poses[0], known)
+        parts[f"{run.name}.mocap"] = tracker.cost(run.values["mocap"])
+    return parts
+
+
+def _lacking(recording: Reduced, devices: frozenset[str]) -> Reduced:
+    values = {d: v for d, v in recording.values.items() if d not in devices}
+    if "imu" in values:
+        imu = values["imu"].copy()
+        if "imu.gyroscope" in devices:
+            imu[:, :3] = np.nan
+        if "imu.accelerometer" in devices:
+            imu[:, 3:] = np.nan
+        values["imu"] = imu
+    return Reduced(
+        recording.name, recording.kind, recording.holdout, recording.dummy, recording.time,
+        recording.kernel, values, recording.start_ns,
+    )  # fmt: skip

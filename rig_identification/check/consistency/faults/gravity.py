@@ -1,0 +1,75 @@
+"""Linear acceleration in place of specific force: the driver has taken gravity out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.examination import SetupFault
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+#: An accelerometer that reads less than this share of gravity at rest does not feel it.
+NOTHING = 0.2
+#: m/s^2: so noisy an accelerometer tells nothing.
+DEAF = 1e3
+
+
+def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
+    """Gravity put back by the attitude that the other devices tell."""
+    rig = evidence.session.rig
+    about = frozenset(["imu.accelerometer"])
+    if rig.imu is None or evidence.bound(about) <= 0.0:
+        return
+    account = evidence.without(about)
+    if account.rest is None:
+        return
+    still = evidence.session.at_rest[0].values.get("imu")
+    if still is None or not np.linalg.norm(still[0, 3:]) < NOTHING * rig.gravity:
+        return
+    R_imu = Rotation.from_quat(rig.imu.orientation).as_matrix()
+    missing: dict[str, Array] = {}
+    for recording, expected in zip(evidence.session.at_rest, account.rest.expected, strict=True):
+        missing[recording.name] = expected["imu"][None]
+    for run, motion in zip(evidence.session.runs, account.motions, strict=False):
+        missing[run.name] = rig.gravity * motion.trajectory.R[:, 2] @ R_imu
+
+    def right(values: Array, name: str) -> Array:
+        out = values.copy()
+        add = missing.get(name)
+        if add is not None and len(add) in (1, len(out)):
+            out[:, 3:] += add
+        return out
+
+    def describe(rest: RestFit | None) -> SetupFault:
+        return fault(
+            "axes",
+            {"channel": "imu", "part": "accelerometer", "kind": "gravity_removed"},
+            {},
+            "The accelerometer reads about 0 at rest: the driver has taken gravity out of the specific force.",
+            "Publish the raw specific force, +9.81 m/s^2 upwards at rest. Until then it is left out: gravity "
+            "was taken out by an attitude that the driver guessed.",
+            corrected=False,
+        )
+
+    readings: dict[str, Reading] = {"imu": right}
+    return_deaf = Change({"imu": _silent}, rig=_deaf)
+    yield Hypothesis(Change(readings), describe, about, variants=1, fitted=lambda rest: return_deaf)
+
+
+def _silent(values: Array, name: str) -> Array:
+    out = values.copy()
+    out[:, 3:] = np.where(np.isfinite(out[:, 3:]), 0.0, np.nan)
+    return out
+
+
+def _deaf(rig: Rig) -> Rig:
+    return replace(rig, noise={**rig.noise, "specific_force": DEAF})

@@ -1,0 +1,89 @@
+"""A tracker's poses: units, order of the quaternion, axes of place and turn, mirrored frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.faults.axes import signed_permutations, written
+from rig_identification.check.consistency.faults.unit import LENGTHS
+from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.examination import SetupFault
+
+Array = NDArray[np.float64]
+ABOUT = frozenset(["mocap"])
+
+
+def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
+    """Units of length, two other orders of a quaternion, and signed permutations of the axes."""
+    if not any("mocap" in r.values for r in evidence.session.recordings):
+        return
+    for unit, factor in LENGTHS.items():
+        yield _unit(unit, factor)
+    yield _one(
+        "quaternion_order", lambda p: _turned(p, p[:, [4, 5, 6, 3]]), 2,
+        "The tracker's quaternions are written w first, in the order w x y z.",
+        "Write quaternions as x y z w (geometry_msgs/msg/Quaternion).",
+    )  # fmt: skip
+    yield _one(
+        "quaternion_inverse", lambda p: _turned(p, p[:, 3:] * [-1.0, -1.0, -1.0, 1.0]), 2,
+        "The tracker's quaternions are inverted: they rotate tracker vectors into the marker's frame.",
+        "Publish the inverse rotation: the marker's orientation in the tracker's frame.",
+    )  # fmt: skip
+    for turn in signed_permutations(3):
+        yield _axes(turn)
+
+
+def _turned(poses: Array, quaternions: Array) -> Array:
+    out = poses.copy()
+    out[:, 3:] = quaternions
+    return out
+
+
+def _unit(unit: str, factor: float) -> Hypothesis:
+    def describe(rest: RestFit | None) -> SetupFault:
+        return fault(
+            "unit",
+            {"channel": "mocap", "quantity": "position", "unit": unit},
+            {"factor": (factor, 0.0, f"m per {unit}")},
+            f"The tracker's positions are recorded in {unit}, not in m.",
+            f"Multiply by {factor:g} in the bridge: publish m.",
+        )
+
+    change = Change({"mocap": lambda poses, _: poses * np.repeat([factor, 1.0], [3, 4])})
+    return Hypothesis(change, describe, ABOUT, variants=len(LENGTHS))
+
+
+def _one(kind: str, right: Callable[[Array], Array], variants: int, statement: str, advice: str) -> Hypothesis:
+    def describe(rest: RestFit | None) -> SetupFault:
+        return fault("axes", {"channel": "mocap", "kind": kind}, {}, statement, advice)
+
+    return Hypothesis(Change({"mocap": lambda poses, _: right(poses)}), describe, ABOUT, variants=variants)
+
+
+def _axes(turn: Array) -> Hypothesis:
+    """Place and turn in the same wrong axes; left-handed ones reverse the sense of every turn."""
+    sense = float(np.linalg.det(turn))
+
+    def right(poses: Array, _: str) -> Array:
+        out = poses.copy()
+        out[:, :3] = poses[:, :3] @ turn.T
+        out[:, 3:6] = sense * poses[:, 3:6] @ turn.T
+        return out
+
+    def describe(rest: RestFit | None) -> SetupFault:
+        names = ", ".join(f"{axis} = {source}" for axis, source in zip("xyz", written(turn), strict=True))
+        handed = "mirrored: its frame is left-handed" if sense < 0.0 else "turned: its z axis does not point up"
+        return fault(
+            "axes",
+            {"channel": "mocap", "kind": "mirrored" if sense < 0.0 else "turned", "permutation": written(turn)},
+            {},
+            f"The tracker's frame is {handed}.",
+            f"Publish {names} of what is published now, and turn the quaternions likewise.",
+        )
+
+    return Hypothesis(Change({"mocap": right}), describe, ABOUT, variants=47)

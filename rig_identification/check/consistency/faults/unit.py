@@ -1,0 +1,122 @@
+"""Readings in another unit than the contract's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.examination import SetupFault
+from rig_identification.rig import Cable, Mount, Rig
+
+Array = NDArray[np.float64]
+
+POUND, GRAVITY, INCH = 0.45359237, 9.80665, 0.0254
+#: Unit -> what one of it is in the contract's unit.
+FORCES = {"kgf": GRAVITY, "gf": GRAVITY / 1000.0, "lbf": POUND * GRAVITY, "kN": 1000.0, "mN": 0.001}
+ACCELERATIONS = {"g": GRAVITY, "milli-g": GRAVITY / 1000.0}
+RATES = {"degrees per second": np.pi / 180.0, "rpm": np.pi / 30.0}
+ANGLES = {"degrees": np.pi / 180.0, "milliradians": 0.001}
+LENGTHS = {"mm": 0.001, "cm": 0.01, "inches": INCH, "feet": 12.0 * INCH}
+
+
+def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
+    """Every unit of every device; cells all together and each by itself."""
+    cells = [c.name for c in evidence.session.rig.cables]
+    for unit, factor in FORCES.items():
+        yield _device(tuple(cells), slice(None), "tension", "N", unit, factor, frozenset(cells))
+        for cell in cells:
+            yield _device((cell,), slice(None), "tension", "N", unit, factor, frozenset(cells))
+        yield _device(("exciter",), slice(None), "force", "N", unit, factor, frozenset(["exciter"]))
+    for unit, factor in ACCELERATIONS.items():
+        about = frozenset(["imu.accelerometer"])
+        yield _device(("imu",), slice(3, 6), "specific force", "m/s^2", unit, factor, about)
+    for unit, factor in RATES.items():
+        about = frozenset(["imu.gyroscope"])
+        yield _device(("imu",), slice(0, 3), "angular rate", "rad/s", unit, factor, about)
+    for unit, factor in ANGLES.items():
+        yield _device(
+            ("inclinometer",), slice(None), "angles", "rad", unit, factor, frozenset(["inclinometer"])
+        )
+    for unit, factor in LENGTHS.items():
+        yield _description(unit, factor)
+
+
+def _device(
+    devices: tuple[str, ...],
+    columns: slice,
+    quantity: str,
+    right: str,
+    unit: str,
+    factor: float,
+    about: frozenset[str],
+) -> Hypothesis:
+    change = Change({device: _scaled(columns, factor) for device in devices})
+    name = "the load cells" if len(devices) > 1 else _named(devices[0])
+    channel: object = devices[0] if len(devices) == 1 else list(devices)
+
+    def describe(rest: RestFit | None) -> SetupFault:
+        return fault(
+            "unit",
+            {"channel": channel, "quantity": quantity.replace(" ", "_"), "unit": unit},
+            {"factor": (factor, 0.0, f"{right} per {unit}")},
+            f"The {quantity} of {name} is recorded in {unit}, not in {right}.",
+            f"Multiply by {factor:.6g} in the driver: publish {right}.",
+        )
+
+    return Hypothesis(change, describe, about, variants=len(FORCES))
+
+
+def _scaled(columns: slice, factor: float) -> Reading:
+    def right(values: Array, _: str) -> Array:
+        out = values.copy()
+        out[:, columns] *= factor
+        return out
+
+    return right
+
+
+def _named(device: str) -> str:
+    return f"the cell of {device}" if device not in ("imu", "inclinometer", "exciter") else f"the {device}"
+
+
+def _description(unit: str, factor: float) -> Hypothesis:
+    def describe(rest: RestFit | None) -> SetupFault:
+        return fault(
+            "unit",
+            {"channel": "description", "quantity": "length", "unit": unit},
+            {"factor": (factor, 0.0, f"m per {unit}")},
+            f"The positions and lengths of the rig description are in {unit}, not in m.",
+            f"Multiply every position and length of the rig description by {factor:g}.",
+        )
+
+    return Hypothesis(
+        Change(rig=lambda rig: _in_metres(rig, factor)), describe, frozenset(["imu.accelerometer"]),
+        variants=len(LENGTHS), fresh=True,
+    )  # fmt: skip
+
+
+def _in_metres(rig: Rig, factor: float) -> Rig:
+    def cable(one: Cable) -> Cable:
+        return replace(
+            one,
+            ceiling_point=factor * one.ceiling_point,
+            body_point=factor * one.body_point,
+            length=factor * one.length,
+        )
+
+    def mount(one: Mount | None) -> Mount | None:
+        return None if one is None else replace(one, position=factor * one.position)
+
+    return replace(
+        rig,
+        cables=tuple(cable(c) for c in rig.cables),
+        imu=mount(rig.imu),
+        exciter=mount(rig.exciter),
+        mocap=mount(rig.mocap),
+    )

@@ -1,0 +1,125 @@
+"""The decision: which hypothesis about the set-up, if any, makes the session hang together.
+
+One at a time: the best hypothesis is accepted if it gains more nats than its price, its readings are put right,
+and the rest is asked again. The price is the same for all: the prior odds of any one fault, the size
+of its family, and what its free numbers cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig_identification.check.consistency import faults
+from rig_identification.check.consistency.evidence import Account, Evidence
+from rig_identification.check.consistency.hypothesis import Change, Hypothesis
+from rig_identification.check.consistency.reduced import reduced
+from rig_identification.check.found import Found, modules_with
+from rig_identification.examination import SetupFault
+from rig_identification.raw import RawSession
+
+#: Nats of the prior odds against any one kind of fault in a session: one in ten thousand.
+PRIOR = float(np.log(1e4))
+#: Nats that a fitted number costs: afterwards it is known to a part in 150 of what it might have been.
+NUMBER = float(np.log(150.0))
+#: Hypotheses within so many nats of the best are evaluated thoroughly, at most ``FINALISTS``.
+NEAR, FINALISTS = 12.0, 4
+#: Two that differ by less explain the session alike: e^3 is twenty to one.
+TIE = 3.0
+#: Faults that one session may have.
+ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A hypothesis and what it gains beyond its price."""
+
+    hypothesis: Hypothesis
+    account: Account
+    gain: float  # nats by which the session hangs together better
+    net: float  # gain less price
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Faults in the order of their evidence, and how what is left agrees at rest."""
+
+    found: tuple[Found, ...]
+    evidence: Evidence | None  # of the session without them; None where nothing can be compared
+
+
+def judged(session: RawSession) -> Verdict:
+    """Find what channels show against each other and against the description."""
+    out: list[Found] = []
+    for _ in range(ROUNDS):
+        small = reduced(session)
+        if not small.recordings or not small.at_rest:
+            return Verdict(tuple(out), None)
+        evidence = Evidence(small)
+        weighed = _weighed(evidence)
+        if not weighed or weighed[0].net <= 0.0:
+            return Verdict(tuple(out), evidence)
+        told = _told(weighed[0], weighed[1:])
+        if any(_same(told, found.fault) for found in out):
+            return Verdict(tuple(out), evidence)
+        session = _changes(weighed[0]).raw(session)
+        out.append(Found(told, session))
+    return Verdict(tuple(out), None)
+
+
+def _same(one: SetupFault, other: SetupFault) -> bool:
+    """Whether a fault is told again: what its correction leaves is no second one."""
+    return one.effect == other.effect and one.where == other.where
+
+
+def _changes(best: Weighed) -> Change:
+    fitted = best.hypothesis.fitted
+    if fitted is not None and best.account.rest is not None:
+        return fitted(best.account.rest)
+    return best.hypothesis.change
+
+
+def proposals(evidence: Evidence) -> Iterator[Hypothesis]:
+    """Hypotheses of every file in ``faults`` that could gain their price."""
+    for family in modules_with(faults, "hypotheses"):
+        for hypothesis in family.hypotheses(evidence):
+            if evidence.bound(hypothesis.about) > PRIOR:
+                yield hypothesis
+
+
+def _weighed(evidence: Evidence) -> list[Weighed]:
+    """The best hypotheses, evaluated thoroughly, best first."""
+    quick = [_weigh(evidence, h, thorough=False) for h in proposals(evidence)]
+    quick.sort(key=lambda w: -w.net)
+    close = [w for w in quick[:FINALISTS] if w.net > quick[0].net - NEAR and w.net > -NEAR]
+    final = [_weigh(evidence, w.hypothesis, thorough=True) for w in close]
+    return sorted(final, key=lambda w: -w.net)
+
+
+def _weigh(evidence: Evidence, hypothesis: Hypothesis, thorough: bool) -> Weighed:
+    account = evidence.judged(hypothesis, thorough)
+    if account.rest is None:
+        return Weighed(hypothesis, account, -np.inf, -np.inf)
+    gain = evidence.plain.cost - account.cost
+    price = PRIOR + float(np.log(hypothesis.variants)) + NUMBER * hypothesis.free
+    return Weighed(hypothesis, account, gain, gain - price)
+
+
+def _told(best: Weighed, others: list[Weighed]) -> SetupFault:
+    ties = []
+    for other in others:
+        gap = best.net - other.net
+        if gap < TIE and other.net > 0.0:
+            told = other.hypothesis.describe(other.account.rest)
+            ties.append(
+                {
+                    "effect": told.effect,
+                    "where": told.where,
+                    "statement": told.statement,
+                    "log_likelihood_gap": gap,
+                }
+            )
+    told = best.hypothesis.describe(best.account.rest)
+    return replace(told, gain=best.gain, alternatives=tuple(ties))

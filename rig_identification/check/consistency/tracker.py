@@ -1,0 +1,135 @@
+"""How well a tracker's poses agree with the motion that the other devices tell, or with the cables alone.
+
+A tracker has a frame of its own, fixed to the room: any proper rotation of it is allowed, and the marker
+sits anywhere on the body unless its mount is described. With d the marker's displacement and q the body's
+turn from their means, in tracker axes, and R the tracker's attitude in the world:
+
+    other devices tell the motion     q = R q_w            d = R (x_w + q_w x m)
+    cables alone                      u_i . (R' d) + (R' q) . ((a_i - m) x u_i) = 0
+
+R by Wahba's problem, all turns about its main axis tried where the motion turns about one axis only; the
+marker's arm m by least squares. What is left is judged as any reading is (:mod:`motion`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rig_identification.check.consistency.motion import ACROSS, INDEPENDENT, ORDINARY, TINY, Trajectory, nats
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+#: Smallest motion that tells anything: m and rad.
+FLOOR = (0.002, 0.002)
+#: Headings tried about an axis that the motion leaves open.
+HEADINGS = 24
+#: A tracker's z axis points upwards within this, rad: one that was levelled by hand.
+LEVEL = 0.1
+#: A marker lies within the hinges' span of the datum.
+REACH = 1.0
+
+
+@dataclass(frozen=True)
+class TrackerModel:
+    """A tracker beside one run's motion."""
+
+    rig: Rig
+    position: Array  # (3,) m, rest place of the datum
+    R0: Array  # (3, 3) rest attitude
+    motion: Trajectory | None  # as the other devices tell it; None: they do not
+
+    def cost(self, poses: Array) -> float:
+        """Nats by which poses (N, 7) disagree."""
+        known = np.isfinite(poses).all(axis=1)
+        if np.count_nonzero(known) < 20:
+            return 0.0
+        poses = poses[known]
+        d = poses[:, :3] - poses[:, :3].mean(axis=0)
+        turns = Rotation.from_quat(poses[:, 3:])
+        middle = turns.mean()
+        q = (turns * middle.inv()).as_rotvec()
+        if self.motion is None:
+            return min(self._by_cables(d, q, R) for R in self._attitudes(middle, None, q))
+        x, w = self._world(known)
+        return min(self._by_motion(d, q, x, w, R) for R in self._attitudes(middle, w, q))
+
+    def _world(self, known: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Displacement of the datum and turn from their means, world axes."""
+        assert self.motion is not None
+        x = self.motion.position[known]
+        turns = Rotation.from_matrix(self.motion.R[known])
+        return x - x.mean(axis=0), (turns * turns.mean().inv()).as_rotvec()
+
+    def _attitudes(self, middle: Rotation, w: Array | None, q: Array) -> list[Array]:
+        """(3, 3) candidates of the tracker's attitude: world vectors into tracker axes."""
+        if self.rig.mocap is not None:
+            marker = Rotation.from_quat(self.rig.mocap.orientation)
+            return [(middle * marker.inv() * Rotation.from_matrix(self.R0).inv()).as_matrix()]
+        headings = 2.0 * np.pi * np.arange(HEADINGS) / HEADINGS
+        if w is None:
+            ups = [Rotation.identity(), *(Rotation.from_rotvec(0.5 * np.pi * s * a) for a in np.eye(3)[:2] for s in (1, -1))]
+            ups.append(Rotation.from_rotvec([np.pi, 0.0, 0.0]))
+            return [(up * Rotation.from_rotvec([0, 0, h])).as_matrix() for up in ups for h in headings]
+        left, _, right = np.linalg.svd(q.T @ w)
+        proper = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
+        R = left @ proper @ right
+        return [R @ Rotation.from_rotvec(h * right[0]).as_matrix() for h in headings]
+
+    def _by_motion(self, d: Array, q: Array, x: Array, w: Array, R: Array) -> float:
+        """Nats for one attitude, the marker's arm fitted."""
+        moved = d @ R
+        arm = self._arm(moved - x, np.swapaxes(_cross(w), 1, 2))
+        left = np.concatenate([moved - x - np.cross(w, arm), q @ R - w], axis=1)
+        spread = np.concatenate([np.std(d @ R, axis=0), np.std(q @ R, axis=0)])
+        return self._nats(left, spread) + self._tilt(R)
+
+    def _by_cables(self, d: Array, q: Array, R: Array) -> float:
+        """Nats for one attitude: what stretches the cables."""
+        moved, turn = d @ R, q @ R
+        hinges = np.array([c.body_point for c in self.rig.cables]) @ self.R0.T
+        span = np.array([c.ceiling_point for c in self.rig.cables]) - self.position - hinges
+        unit = span / np.linalg.norm(span, axis=1, keepdims=True)
+        stretch = moved @ unit.T + turn @ np.cross(hinges, unit).T
+        rows = np.cross(unit[None], turn[:, None, :])  # (N, n, 3): by the marker's arm
+        arm = self._arm_of(rows.reshape(-1, 3), stretch.reshape(-1))
+        left = stretch - rows @ arm
+        whole = float(np.sqrt(np.mean(moved**2) + np.mean(turn**2) * np.mean(hinges**2)))
+        return self._nats(left, np.full(unit.shape[0], whole)) + self._tilt(R)
+
+    def _arm(self, miss: Array, by_turn: Array) -> Array:
+        """(3,) m, world axes: w x m explains ``miss`` best."""
+        rows = -np.swapaxes(by_turn, 1, 2)
+        return self._arm_of(rows.reshape(-1, 3), miss.reshape(-1))
+
+    def _arm_of(self, rows: Array, miss: Array) -> Array:
+        span = max(float(np.ptp([c.body_point for c in self.rig.cables], axis=0).max()), 0.1)
+        about = np.zeros(3) if self.rig.mocap is None else self.R0 @ self.rig.mocap.position
+        reach = REACH * span if self.rig.mocap is None else 0.02 * span
+        std = ORDINARY * max(float(np.std(miss)), FLOOR[0])
+        normal = rows.T @ rows / std**2 + np.eye(3) / reach**2
+        return about + np.linalg.solve(normal, rows.T @ (miss - rows @ about) / std**2)
+
+    def _nats(self, left: Array, spread: Array) -> float:
+        floor = np.repeat(FLOOR, [3, left.shape[1] - 3]) if left.shape[1] == 6 else FLOOR[0]
+        noise = (self.rig.noise.get("mocap_position", 0.0), self.rig.noise.get("mocap_orientation", 0.0))
+        floor = np.maximum(floor, np.repeat(noise, [3, 3]) if left.shape[1] == 6 else noise[0])
+        whole = np.sqrt(np.mean(spread**2))
+        std = np.sqrt(floor**2 + (ORDINARY * spread) ** 2 + (ACROSS * whole) ** 2)
+        return float(np.sum(nats(np.mean(left**2, axis=0) / std**2, std / np.maximum(spread, TINY))))
+
+    def _tilt(self, R: Array) -> float:
+        """Nats by which a tracker's z axis is not up."""
+        tilt = float(np.arccos(np.clip(R[2, 2], -1.0, 1.0)))
+        return 0.5 * INDEPENDENT * float(np.log1p((tilt / LEVEL) ** 2))
+
+
+def _cross(v: Array) -> Array:
+    """(N, 3, 3) matrices of the cross product with v."""
+    x, y, z = v.T
+    zero = np.zeros_like(x)
+    return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
