@@ -328,7 +328,7 @@ def test_a_factor_counts_either_way_round_and_to_a_percent(cases: dict[str, Case
     case = cases["unit/imu/g"]
     for value, right in ((9.80665, True), (1.0 / 9.80665, True), (9.6, False)):
         told = fault("unit", {"channel": "imu"}, parameters={"factor": value})
-        assert marked(Examination("s", (), (), (told,)), case).factor_right is right
+        assert marked(Examination("s", (), (), (told,)), case).amount_right is right
 
 
 def test_an_ordinary_effect_is_no_false_alarm_in_its_own_place_alone() -> None:

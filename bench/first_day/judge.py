@@ -25,7 +25,7 @@ class Marks:
 
     outcome: str  # "named", "other kind", "tie", "later", "wrong", "silent"
     said: tuple[str, ...]  # effect and channel of every fault told, in order
-    factor_right: bool | None  # the parameter that was asked for, to a percent; None: none was asked for
+    amount_right: bool | None  # the parameter that was asked for; None: none was asked for
     corrected: bool | None  # of the named fault: whether the fit uses corrected data
     statement: str = ""  # of the first fault
 
@@ -97,14 +97,17 @@ def _rival_right(rival: Mapping[str, object], case: Case) -> bool:
 
 
 def _parameters_right(fault: SetupFault, case: Case) -> bool | None:
-    """Whether what was asked for is told to a percent, as itself or as its inverse."""
+    """Whether what was asked for is told, in size; a unit's factor as itself or as its inverse."""
     if not case.expected:
         return None
     for name, true in case.expected.items():
         value = fault.parameters.get(name, {}).get("value")
         if not isinstance(value, (int, float)) or value == 0.0:
             return False
-        if abs(np.log(abs(value / true))) > 0.01 and abs(np.log(abs(value * true))) > 0.01:
+        off = [abs(np.log(abs(value / true)))]
+        if name == "factor":
+            off.append(abs(np.log(abs(value * true))))
+        if min(off) > np.log1p(case.within):
             return False
     return True
 

@@ -46,6 +46,8 @@ def _group(own: Sequence[Entry]) -> dict[str, Any]:
         **{name: counts.get(name, 0) for name in OUTCOMES},
         "median_seconds": float(np.median(seconds)) if seconds else None,
         "most_seconds": float(np.max(seconds)) if seconds else None,
+        "amounts_asked": sum(e.get("amount_right") is not None for e in own),
+        "amounts_right": sum(e.get("amount_right") is True for e in own),
         "inertia_judged": len(judged),
         "inertia_within_3_sigma": sum(j["sigma"] is not None and j["sigma"] <= 3.0 for j in judged),
     }
@@ -74,14 +76,17 @@ def as_markdown(entries: Sequence[Entry], code: str) -> str:
 
 
 def _by_group(score: dict[str, Any]) -> list[str]:
-    head = ["group", "cases", *OUTCOMES, "named", "s, median", "s, most", "J within 3 sigma"]
+    head = ["group", "cases", *OUTCOMES, "named", "amounts right", "s, median", "s, most", "J within 3 sigma"]
     lines = [_row(head), _row(["---"] * len(head))]
     for name, g in score["groups"].items():
         share = f"{100 * g['named'] / g['cases']:.1f} %"
         judged = f"{g['inertia_within_3_sigma']} of {g['inertia_judged']}" if g["inertia_judged"] else "-"
         median, most = ("-" if g[k] is None else f"{g[k]:.1f}" for k in ("median_seconds", "most_seconds"))
         counts = [g[o] for o in OUTCOMES]
-        lines.append(_row([GROUPS.get(name, name), g["cases"], *counts, share, median, most, judged]))
+        amounts = f"{g['amounts_right']} of {g['amounts_asked']}"
+        lines.append(
+            _row([GROUPS.get(name, name), g["cases"], *counts, share, amounts, median, most, judged])
+        )
     return lines
 
 

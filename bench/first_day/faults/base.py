@@ -29,7 +29,8 @@ class Case:
     kinds: tuple[str, ...] = ()  # of a stamp error: words that a right answer may give of it
     also: tuple[str, ...] = ()  # effect words that are as true
     untellable: str = ""  # the physical reason why no recording of this session shows it; "": it shows
-    expected: dict[str, float] = field(default_factory=dict)  # parameters that a right answer gives, SI
+    expected: dict[str, float] = field(default_factory=dict)  # parameters that a right answer gives
+    within: float = 0.01  # relative, of those parameters
 
     @property
     def group(self) -> str:

@@ -21,7 +21,8 @@ def cases(raw: RawSession) -> Iterator[Case]:
     yield from _dummies(raw)
     if raw.rig.mass is not None:
         for name, factor in (("pounds", 1.0 / POUND), ("read_as_pounds", POUND)):
-            yield Case(f"wiring/mass/{name}", "mass_error", (), _weighed(factor), expected={"factor": factor})
+            true = {"mass": raw.rig.mass}
+            yield Case(f"wiring/mass/{name}", "mass_error", (), _weighed(factor), expected=true)
 
 
 def _files(raw: RawSession) -> Iterator[Case]:
@@ -87,18 +88,18 @@ def _undated(runs: list[int]) -> Injector:
 def _dummies(raw: RawSession) -> Iterator[Case]:
     if not any(r.dummy is not None for r in raw.recordings):
         return
+    dummy = next(r.dummy for r in raw.recordings if r.dummy is not None)
+    true = {"mass": dummy.mass}
     span = np.ptp([c.body_point for c in raw.rig.cables], axis=0)[:2]
     for share in MASS_OFF:
-        yield Case(
-            f"wiring/dummy_mass/{100 * share:.0f}_percent_more", "dummy_error", (), _dummy(1.0 + share, 0.0)
-        )
+        name = f"wiring/dummy_mass/{100 * share:.0f}_percent_more"
+        yield Case(name, "dummy_error", (), _dummy(1.0 + share, 0.0), expected=true)
     yield Case("wiring/dummy_mass/pounds", "dummy_error", (), _dummy(1.0 / POUND, 0.0), also=("unit",))
     for share in PLACE_OFF:
         away = share * np.array([span[0], -span[1], 0.0])
         name = f"wiring/dummy_place/{100 * share:.0f}_percent_of_span"
         yield Case(name, "dummy_error", (), _dummy(1.0, away))
-    place = next(r.dummy.position for r in raw.recordings if r.dummy is not None)
-    if abs(place[0] - place[1]) > PLACE_OFF[0] * float(np.max(span)):
+    if abs(dummy.position[0] - dummy.position[1]) > PLACE_OFF[0] * float(np.max(span)):
         yield Case("wiring/dummy_place/x_y_swapped", "dummy_error", (), _dummy_turned)
 
 

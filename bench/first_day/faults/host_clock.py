@@ -17,10 +17,10 @@ def cases(raw: RawSession) -> Iterator[Case]:
     everything = tuple(sorted({c.device for r in raw.recordings for c in r.channels}))
     for step in STEPS:
         for sign in (1.0, -1.0):
-            yield stamp_case("clock_step", "all", f"{sign * step:+g}_s", everything, _host_step(sign * step))
-    yield stamp_case(
-        "leap_seconds", "all", "devices_ahead_of_recorder", everything, on(everything, ahead(LEAP))
-    )
+            inject = _host_step(sign * step)
+            yield stamp_case("clock_step", "all", f"{sign * step:+g}_s", everything, inject, offset=step)
+    inject = on(everything, ahead(LEAP))
+    yield stamp_case("leap_seconds", "all", "devices_ahead_of_recorder", everything, inject, offset=LEAP)
     reason = "all clocks alike, the recorder's too, against a time that nothing in the session shows"
     yield stamp_case("leap_seconds", "all", f"{LEAP:+d}_s", everything, _host_shift(LEAP * SECOND), reason)
     reason = "all clocks run alike: 100 ppm of time are 200 ppm of the pendulum's length"

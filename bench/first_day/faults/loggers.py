@@ -65,7 +65,8 @@ def _averaging(name: str, names: tuple[str, ...], window: float) -> Case:
         names,
         on(names, _averaged(window)),
         also=("sensor_lag",),
-        expected={"window": window},
+        expected={"delay": 0.5 * window},
+        within=0.2,
     )
 
 

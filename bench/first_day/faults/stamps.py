@@ -21,7 +21,9 @@ Stamps = NDArray[np.int64]
 StampLaw = Callable[[RawChannel, np.random.Generator], RawChannel]
 
 SECOND = 1_000_000_000
-ARRIVALS = ("arrival_time", "usb_bursts")
+#: Kinds that are one thing in two words: hand-overs in bursts are arrivals, and a queue hands over in bursts;
+#: a clock that was never set shows zero, one instant, or seconds since its own start.
+ALIKE = (("arrival_time", "usb_bursts"), ("zero_stamps", "simulated_stamps", "other_clock"))
 LEAP = 37  # s, TAI less UTC
 STEPS = (0.05, 0.5, 30.0)  # s
 DRIFTS = (100.0, 300.0, 1000.0)  # ppm
@@ -56,17 +58,25 @@ def _places(raw: RawSession, held: tuple[str, ...]) -> list[tuple[str, tuple[str
 
 
 def stamp_case(
-    kind: str, place: str, variant: str, names: tuple[str, ...], inject: Injector, untellable: str = ""
+    kind: str,
+    place: str,
+    variant: str,
+    names: tuple[str, ...],
+    inject: Injector,
+    untellable: str = "",
+    **expected: float,
 ) -> Case:
+    """A stamp error of all devices, or of ``names``."""
     channels = names if place != "all" else ()
     return Case(
         f"stamps/{kind}/{place}/{variant}",
         "stamp_error",
         channels,
         inject,
-        # Hand-overs in bursts are arrivals, and a queue hands over in bursts
-        kinds=ARRIVALS if kind in ARRIVALS else (kind,),
+        kinds=next((alike for alike in ALIKE if kind in alike), (kind,)),
         untellable=untellable,
+        expected=expected,
+        within=0.1,
     )
 
 
@@ -111,15 +121,16 @@ def _clocks(place: str, names: tuple[str, ...]) -> Iterator[Case]:
     for step in STEPS:
         for sign in (1.0, -1.0):
             variant = f"{sign * step:+g}_s"
-            yield stamp_case(
-                "clock_step", place, variant, names, on(names, _stepped(sign * step), ("dynamic",))
-            )
+            inject = on(names, _stepped(sign * step), ("dynamic",))
+            yield stamp_case("clock_step", place, variant, names, inject, offset=step)
     for sign in (1, -1):
-        yield stamp_case("leap_seconds", place, f"{sign * LEAP:+d}_s", names, on(names, ahead(sign * LEAP)))
+        inject = on(names, ahead(sign * LEAP))
+        yield stamp_case("leap_seconds", place, f"{sign * LEAP:+d}_s", names, inject, offset=LEAP)
     for drift in DRIFTS:
         for sign in (1.0, -1.0):
             variant = f"{sign * drift:+g}_ppm"
-            yield stamp_case("clock_drift", place, variant, names, on(names, _drifting(sign * drift)))
+            inject = on(names, _drifting(sign * drift))
+            yield stamp_case("clock_drift", place, variant, names, inject, drift=drift)
 
 
 def ahead(seconds: int) -> StampLaw:
