@@ -448,3 +448,22 @@ def test_check_compiles_nothing_that_only_fits_need(folder: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr.strip() == "[]"
+
+
+@pytest.mark.parametrize("scale", [1e-2, 1.0, 1e3])
+def test_a_description_in_any_unit_is_drawn_as_written(rig: Rig, scale: float) -> None:
+    """A rig in millimetres is drawn too, with a bar that shows the thousandfold size."""
+    cables = tuple(
+        replace(
+            cable,
+            ceiling_point=scale * cable.ceiling_point,
+            body_point=scale * cable.body_point,
+            length=scale * cable.length,
+        )
+        for cable in rig.cables
+    )
+    wrong = replace(rig, cables=cables, imu=None, exciter=None, mocap=None)
+    for _, svg in rig_svgs(described_scene(wrong)):
+        assert "nan" not in svg
+        (bar,) = (t.text for t in ElementTree.fromstring(svg).iter("text") if (t.text or "").endswith(" m"))
+        assert scale <= float(str(bar).removesuffix(" m")) <= 5.0 * scale

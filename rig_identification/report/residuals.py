@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 Array = NDArray[np.float64]
 
@@ -69,6 +68,8 @@ def summarise_residual(
 
 def _spectrum(residual: Array, interval: float) -> tuple[Array, Array]:
     """Welch's power density over that of white noise of one sigma, which is ``2 * interval``."""
+    from scipy import signal  # takes most of a second: not where nothing was fitted
+
     if len(residual) < 16:
         return np.empty(0), np.empty(0)
     length = min(len(residual), max(16, min(4096, len(residual) // 4)))
@@ -85,6 +86,8 @@ def _log_average(frequency: Array, power: Array, per_decade: int = 24) -> tuple[
 
 
 def _correlation(residual: Array, lags: int) -> Array:
+    from scipy import signal
+
     centred = residual - np.mean(residual)
     power = float(centred @ centred)
     count = min(lags, len(residual) // 4)

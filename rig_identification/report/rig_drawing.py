@@ -18,6 +18,8 @@ from rig_identification.rig import Rig
 Array = NDArray[np.float64]
 
 WIDTH, HEIGHT, MARGIN = 440, 340, 40  # px of one view
+#: m, longest first: a description in millimetres is drawn as it is written.
+_SCALE_BARS = tuple(step * 10.0**power for power in range(4, -4, -1) for step in (5.0, 2.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -206,7 +208,7 @@ def _center_mark(point: Array) -> str:
 
 
 def _scale_bar(scale: float) -> str:
-    length = next(s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.0) if s * scale <= 110.0)
+    length = next((s for s in _SCALE_BARS if s * scale <= 110.0), 0.0)
     text = f"{length:g} m"
     return (
         f'<path class="scale" d="M{MARGIN / 2:.1f} {HEIGHT - 14}v5h{length * scale:.1f}v-5"/>'
