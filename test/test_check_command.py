@@ -348,6 +348,20 @@ def test_a_mistyped_topic_is_a_warning_that_says_which_option_helps(
     assert any(topic["topic"] == "/rig/imu/data" and topic["used"] for topic in document["topics"])
 
 
+@pytest.mark.parametrize("command", ["identify", "check"])
+def test_a_topic_that_is_asked_for_and_not_there_is_an_error(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    out = tmp_path / "out"
+    mapped = "imu/data_raw=/rig/imu/data_rau"
+    assert main([command, str(folder), "--out", str(out), "--topic", mapped]) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert f"--topic {mapped}: no bag holds /rig/imu/data_rau" in said.err
+    assert "/rig/imu/data_raw" in said.err
+    assert not out.exists()
+
+
 def rename(bag: Path, old: str, new: str) -> None:
     """Publish a topic under another name."""
     original = bag.rename(bag.with_name("original"))

@@ -133,7 +133,7 @@ def test_what_is_mounted_and_nowhere_recorded_is_told(topic: str) -> None:
     device = topic.partition("/")[0]
     (sentence,) = told(recording("run_1", without=(topic,)), recording("run_2", without=(topic,)))
     assert sentence.startswith(f"{device}: ")
-    assert f"no bag holds /rig/{topic}" in sentence
+    assert f"no bag holds a message of /rig/{topic}" in sentence
 
 
 def test_what_only_some_bags_hold_is_told_with_the_bags() -> None:
@@ -149,7 +149,7 @@ def test_an_imu_of_another_name_is_proposed() -> None:
     """The mistyped topic that drops a device: one sentence that says which option brings it back."""
     one = beside(recording("run_1", without=("imu/data_raw",)), "/rig/imu/data", IMU)
     (sentence,) = told(one)
-    assert "no bag holds /rig/imu/data_raw" in sentence
+    assert "no bag holds a message of /rig/imu/data_raw" in sentence
     assert "--topic imu/data_raw=/rig/imu/data " in sentence
 
 
@@ -190,6 +190,15 @@ def test_another_type_under_a_devices_name_is_told() -> None:
     assert "/rig/imu/raw (std_msgs/msg/Float64MultiArray" in sentence
 
 
+def test_a_topic_without_messages_is_as_good_as_missing() -> None:
+    one = recording("run_1", without=("imu/data_raw",))
+    one = beside(beside(one, "/rig/imu/data_raw", IMU, count=0), "/xsens/imu", IMU, count=0)
+    (sentence,) = told(one)
+    assert "no bag holds a message of /rig/imu/data_raw" in sentence
+    assert "--topic" not in sentence  # the other one has none either
+    assert accounts(one)["/rig/imu/data_raw"].note == "has no message"
+
+
 def test_a_device_that_the_description_does_not_mount_is_told() -> None:
     (sentence,) = told(recording("run_1"), rig=replace(make_rig(), imu=None))
     assert sentence.startswith("imu: the bags hold /rig/imu/data_raw, and the rig description has no imu")
@@ -215,12 +224,12 @@ def test_a_rig_without_load_cells_is_a_note() -> None:
 
 def test_a_namespace_is_part_of_what_is_looked_for() -> None:
     (sentence,) = told(recording("run_1", without=("imu/data_raw",)), namespace="lab/")
-    assert "no bag holds /lab/imu/data_raw" in sentence
+    assert "no bag holds a message of /lab/imu/data_raw" in sentence
 
 
 def test_the_examination_holds_the_inventory() -> None:
     one = replace(recording("run_1", without=("imu/data_raw",)), notes=("the index was missing",))
     found = examine(RawSession("van", make_rig(), (one,), notes=("a proposal",))).examination
     assert [account.topic for account in found.topics] == list(one.listed)
-    assert any("no bag holds /rig/imu/data_raw" in warning for warning in found.warnings)
+    assert any("no bag holds a message of /rig/imu/data_raw" in warning for warning in found.warnings)
     assert found.notes[:2] == ("a proposal", "the index was missing")

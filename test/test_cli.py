@@ -21,7 +21,7 @@ from rig_identification.cli.summary import summary
 from rig_identification.errors import InputError
 from rig_identification.examination import Examination
 from rig_identification.identification import Prepared
-from rig_identification.raw import RawRecording, RawSession
+from rig_identification.raw import RawSession
 from rig_identification.recording import Session
 from rig_identification.result import Identification
 
@@ -42,8 +42,7 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
 
         def read_raw(path: Path, **options: object) -> RawSession:
             seen.update(options, path=path)
-            listed = {"/xsens/imu": "sensor_msgs/msg/Imu", "/vicon/van": "geometry_msgs/msg/PoseStamped"}
-            return RawSession("van", session.rig, (RawRecording("run_1", "dynamic", False, "", (), listed),))
+            return RawSession("van", session.rig, ())
 
         module = types.ModuleType("rig_identification.mismatch")
         module.identify = identify  # type: ignore[attr-defined]
@@ -95,19 +94,6 @@ def test_topics_and_namespace_reach_the_reader(answer: Install, tmp_path: Path) 
     seen = answer.seen  # type: ignore[attr-defined]
     assert seen["namespace"] == "/lab"
     assert seen["topics"] == {"imu/data_raw": "/xsens/imu", "mocap/pose": "/vicon/van"}
-
-
-@pytest.mark.parametrize("command", ["identify", "check"])
-def test_a_topic_that_is_asked_for_and_not_there_is_an_error(
-    answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    answer(AssertionError("the work must not begin"))
-    out = tmp_path / "out"
-    assert main([command, "van", "--out", str(out), "--topic", "imu/data_raw=/xsens/imus"]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "no bag holds /xsens/imus; did you mean /xsens/imu" in error
-    assert not out.exists()
 
 
 @pytest.mark.parametrize(
@@ -168,11 +154,48 @@ def test_out_that_cannot_be_used(answer: Install, tmp_path: Path, capsys: pytest
     file.write_text("")
     occupied = tmp_path / "occupied"
     (occupied / "report.html").mkdir(parents=True)
-    for out in (file, file / "below", occupied):
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    impossible = [file, file / "below", occupied, tmp_path / "nowhere", tmp_path / ("long" * 100)]
+    # A file system that takes no new files, whoever asks.
+    impossible += [Path("/proc/below")] if sys.platform == "linux" else []
+    for out in impossible:
         assert main(["identify", "van", "--out", str(out)]) == 2
         error = capsys.readouterr().err
         assert str(out) in error
         assert error.count("\n") == 1
+
+
+def test_the_trial_of_the_output_folder_leaves_no_trace(answer: Install, tmp_path: Path) -> None:
+    answer(InputError("run_1: no"))
+    assert main(["identify", "van", "--out", str(tmp_path / "out")]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("effect", ["hinge_dampng=20", "sprung_mas.mass=30", "imu.gyroscope_bais.x=0.01"])
+def test_an_effect_misspelt_has_its_right_name_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], effect: str
+) -> None:
+    out = str(tmp_path / "out")
+    arguments = ["simulate", "--case", "14", "--duration", "1", "--rest", "0", "--out", out]
+    assert main([*arguments, "--effect", effect]) == 2
+    said = capsys.readouterr().err
+    meant = {"h": "hinge_damping", "s": "sprung_mass.mass", "i": "imu.gyroscope_bias.x"}[effect[0]]
+    assert said.rstrip().endswith(f"; did you mean {meant}?")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_simulate_says_before_its_work_that_it_cannot_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def work(*_: object) -> None:
+        raise AssertionError("the work must not begin")
+
+    monkeypatch.setattr("rig_identification.simulate.simulate_session", work)
+    file = tmp_path / "file"
+    file.write_text("")
+    for out in (file / "below", file):
+        assert main(["simulate", "--case", "14", "--out", str(out), "--overwrite"]) == 2
+        assert f"--out {out}: " in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")

@@ -91,7 +91,7 @@ def _recording_accounts(raw: RawRecording, used: RawRecording, rig: Rig) -> list
     accounts += [
         TopicAccount(
             raw.name, name, kind, None, False, raw.counts.get(name, 0), 0.0, 0.0, 0.0, 0, 0.0, None,
-            "no topic of the contract",
+            "no topic of the contract" if raw.counts.get(name, 0) else "has no message",
         )
         for name, kind in raw.listed.items()
         if name not in known

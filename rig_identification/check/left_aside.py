@@ -64,7 +64,8 @@ def _strangers(raw: RawSession, topics: Sequence[TopicAccount]) -> dict[str, tup
     """Topics of no device that look like one's: name -> message type, recordings."""
     found: dict[str, tuple[str, list[str]]] = {}
     for account in topics:
-        if account.device is None and _looks_like_a_device(raw, account.topic, account.message_type):
+        recorded = account.device is None and account.count > 0
+        if recorded and _looks_like_a_device(raw, account.topic, account.message_type):
             found.setdefault(account.topic, (account.message_type, []))[1].append(account.recording)
     return found
 
@@ -90,7 +91,7 @@ def _missing(
             like = difflib.get_close_matches(_prefix(raw) + topic, like, n=1, cutoff=0.6)
         claimed |= set(like)
         sentences.append(
-            f"{device}: the rig description mounts it, and no bag holds {_prefix(raw)}{topic}: "
+            f"{device}: the rig description mounts it, and no bag holds a message of {_prefix(raw)}{topic}: "
             f"it tells nothing of this session. {_mapping(topic, like, strangers)}"
         )
     return sentences, frozenset(claimed)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from rig_identification.errors import InputError
 
 if TYPE_CHECKING:
     from rig_identification.cli.progress import StageProgress
@@ -43,25 +40,12 @@ def read_recorded(
     """
     from rig_identification.session import read_raw
 
-    raw = read_raw(path, namespace=namespace, topics=topics, progress=watched(progress))
-    check_topics_there(raw, topics)
-    return raw
+    return read_raw(path, namespace=namespace, topics=topics, progress=watched(progress))
 
 
 def watched(progress: StageProgress) -> StageProgress | None:
     """Progress on a terminal alone: where nobody watches, what cannot be used is one line and no more."""
     return progress if progress.terminal else None
-
-
-def check_topics_there(raw: RawSession, topics: Mapping[str, str]) -> None:
-    """Refuse a mapping to a topic that is in no bag. Raises InputError."""
-    held = sorted({name for recording in raw.recordings for name in recording.listed})
-    for name, topic in topics.items():
-        if "/" + topic.lstrip("/") in held:
-            continue
-        near = difflib.get_close_matches(topic, held, n=1)
-        hint = f"did you mean {near[0]}" if near else f"they hold {', '.join(held) or 'none'}"
-        raise InputError(f"--topic {name}={topic}: no bag holds {topic}; {hint}")
 
 
 def _mapping(text: str) -> tuple[str, str]:
