@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 import zlib
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -32,11 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Command line: run what is missing, write the figures."""
     options = _parser().parse_args(arguments)
     tasks = [*_fault_tasks(options), *_quiet_tasks(options), *_recorded_tasks(options)]
-    entries = _run(tasks, options.log, options.jobs)
+    entries = _run(tasks, options.log, options.jobs, options.minutes)
     code = fingerprint()
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "first_day_results.json").write_text(json.dumps(figures(entries), indent=1) + "\n")
-    (options.out / "first_day_results.md").write_text(as_markdown(entries, code))
+    (options.out / "first_day_results.md").write_text(as_markdown(entries, code, len(tasks)))
     return 0
 
 
@@ -62,6 +63,7 @@ def _parser() -> argparse.ArgumentParser:
         help='a recorded session and what is wrong with it, as "unit imu"',
     )  # fmt: skip
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no task after so many")
     parser.add_argument("--log", type=Path, default=DEFAULT_CACHE / "first_day.jsonl", help="one line a task")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of first_day_results.md and .json")
     return parser
@@ -93,15 +95,19 @@ def _recorded_tasks(options: argparse.Namespace) -> list[Task]:
     return tasks
 
 
-def _run(tasks: Sequence[Task], log: Path, jobs: int) -> list[dict[str, Any]]:
-    """Entries of all tasks in their order; what the log has is not done again."""
+def _run(tasks: Sequence[Task], log: Path, jobs: int, minutes: float) -> list[dict[str, Any]]:
+    """Entries of the tasks in their order; what the log has is not done again.
+
+    Tasks are done in an order drawn by their names: what is done when the time is up is a fair sample.
+    """
     code = fingerprint()
     known: dict[str, dict[str, Any]] = {}
     if log.exists():
         lines = (json.loads(line) for line in log.read_text().splitlines())
         known = {e["key"]: e for e in lines if e["code"] == code}
     log.parent.mkdir(parents=True, exist_ok=True)
-    missing = [task for task in tasks if task.key not in known]
+    missing = sorted((t for t in tasks if t.key not in known), key=lambda t: zlib.crc32(t.key.encode()))
+    stop = time.monotonic() + 60.0 * minutes
     with log.open("a") as stream:
 
         def keep(entry: dict[str, Any]) -> None:
@@ -111,12 +117,19 @@ def _run(tasks: Sequence[Task], log: Path, jobs: int) -> list[dict[str, Any]]:
 
         if jobs == 1:
             for task in missing:
+                if time.monotonic() > stop:
+                    break
                 keep(done(task))
         else:
             with ProcessPoolExecutor(jobs) as pool:
-                for future in as_completed([pool.submit(done, task) for task in missing]):
-                    keep(future.result())
-    return [known[task.key] for task in tasks]
+                for future in as_completed([pool.submit(_in_time, task, stop) for task in missing]):
+                    if (entry := future.result()) is not None:
+                        keep(entry)
+    return [known[task.key] for task in tasks if task.key in known]
+
+
+def _in_time(task: Task, stop: float) -> dict[str, Any] | None:
+    return done(task) if time.monotonic() <= stop else None
 
 
 if __name__ == "__main__":

@@ -51,10 +51,11 @@ class Task:
 
 
 def fingerprint() -> str:
-    """Of everything that an examination runs, and of what is put in: other code, other answers."""
+    """Of the examination's own code, of what is put in and how it is marked: other code, other answers."""
     root = Path(rig_identification.__file__).parent
     files = [p for name in ("check", "session") for p in sorted((root / name).rglob("*.py"))]
-    files += [root / "raw.py", root / "examination.py", *sorted(Path(__file__).parent.rglob("*.py"))]
+    files += [root / "raw.py", root / "examination.py", Path(__file__).with_name("judge.py"), Path(__file__)]
+    files += sorted((Path(__file__).parent / "faults").glob("*.py"))
     return hashlib.sha256(b"".join(p.read_bytes() for p in files)).hexdigest()[:12]
 
 

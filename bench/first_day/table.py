@@ -53,10 +53,20 @@ def _group(own: Sequence[Entry]) -> dict[str, Any]:
     }
 
 
-def as_markdown(entries: Sequence[Entry], code: str) -> str:
-    """The whole page."""
+def as_markdown(entries: Sequence[Entry], code: str, tasks: int) -> str:
+    """The whole page; ``tasks``: how many there are to do in all."""
     score = figures(entries)
-    lines = ["# The first day", "", *_by_group(score), "", *_alarms(score), "", *_by_kind(entries)]
+    lines = [
+        "# The first day",
+        "",
+        f"{len(entries)} of {tasks} tasks done.",
+        "",
+        *_by_group(score),
+        "",
+        *_alarms(score),
+        "",
+        *_by_kind(entries),
+    ]
     lines += ["", "## Misses", "", *_misses(entries)]
     lines += ["", "## What cannot be told", "", *_untellable(entries)]
     recorded = [e for e in entries if e["kind"] == "recorded"]
