@@ -1,0 +1,124 @@
+"""Stamps taken after the measurement: on arrival at the host, or when a driver hands several samples over."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.check.stamps.regular import (
+    TOGETHER,
+    Grid,
+    envelope_grid,
+    mean_interval,
+    rate_line,
+    seconds,
+    usual_interval,
+)
+from rig_identification.check.stamps.streams import SECOND, Stream
+from rig_identification.raw import Stamps
+
+Array = NDArray[np.float64]
+
+#: Part of the intervals below a tenth of the sampling interval that is ordinary: jitter of a fifth of an
+#: interval makes 0.1 %, an even one that nearly swaps samples 0.2 %, a message in twenty comes out of order.
+_ORDINARY_TOGETHER = 0.06
+#: Part of the deviations, the largest, whose sides are counted.
+_LARGEST = 0.2
+#: From this agreement of phases on, deviations are told apart from those by an interval more.
+_AGREEING = 0.1
+
+
+@dataclass(frozen=True)
+class Late:
+    """A stream whose stamps are late by more than ordinary jitter."""
+
+    grid: Grid
+    stamps: Stamps  # (n,) ns, of measurement as the grid has it, up to a constant delay
+    gain: float  # nats
+    together: int  # intervals shorter than a tenth of the sampling interval
+    handover: float  # s, median time between the others
+    polled: bool  # samples come together, at times as even as those of a driver that polls
+    std: float  # s, of the delay that stays unknown
+
+
+def late(stream: Stream, tolerance: float) -> Late | None:
+    """How late the stamps of a stream are, None where they are as a device would give them.
+
+    tolerance: s, doubt of a device's clock; jitter below it does no harm and is nobody's fault.
+    """
+    times, fresh = _fresh(stream)
+    mean = mean_interval(times)
+    if mean <= 0.0 or float(np.ptp(stream.stamps)) / SECOND > 3.0 * mean * len(times):
+        return None  # stamps that jump are another kind's
+    steps = np.diff(times)
+    if float(np.quantile(steps, 0.9) - np.quantile(steps, 0.1)) < tolerance:
+        return None
+    short = steps < TOGETHER * mean
+    gain = len(steps) * _relative_entropy(float(np.mean(short)), _ORDINARY_TOGETHER)
+    interval = None
+    if gain <= 0.0:
+        interval = usual_interval(times)
+        interval, agreement = rate_line(times)
+        gain = _one_sided(times, interval) if agreement > _AGREEING else 0.0
+    if gain <= 0.0:
+        return None
+    return _on_grid(stream, fresh, envelope_grid(times, interval), gain, short, steps)
+
+
+def _on_grid(
+    stream: Stream, fresh: NDArray[np.bool_], grid: Grid, gain: float, short: NDArray[np.bool_], steps: Array
+) -> Late:
+    handovers = steps[~short]
+    low, middle, high = np.quantile(handovers, [0.25, 0.5, 0.75])
+    stamps = stream.stamps.copy()
+    stamps[fresh] = stream.stamps[0] + np.round(grid.times * SECOND).astype(np.int64)
+    # The shortest latency seen is of the size of their spread, unless the driver polls: then of one transfer.
+    spread = float(np.quantile(grid.late, 0.75) - np.quantile(grid.late, 0.25))
+    polled = bool(np.mean(short) > _ORDINARY_TOGETHER and high - low < 0.3 * middle)
+    return Late(
+        grid=grid, stamps=stamps, gain=gain, together=int(np.count_nonzero(short)), handover=float(middle),
+        polled=polled, std=max(0.25 * spread, 1e-3),
+    )  # fmt: skip
+
+
+def _fresh(stream: Stream) -> tuple[Array, NDArray[np.bool_]]:
+    """Times (s) of the messages that are no repetition of the one before, and which these are."""
+    same = np.diff(stream.stamps) == 0
+    values = stream.channel.values
+    repeated = (
+        same & np.all((np.diff(values, axis=0) == 0) | np.isnan(values[1:]), axis=1) if same.any() else same
+    )
+    fresh = np.concatenate(([True], ~repeated))
+    return seconds(stream.stamps)[fresh], fresh
+
+
+def _one_sided(times: Array, interval: float) -> float:
+    """Nats for deviations from regular sampling that are late more often than early.
+
+    Of the largest deviations about their middle, ordinary jitter has as many on either side, whatever its
+    law.
+    Deviations that last several samples count once.
+    """
+    turns = times / interval
+    middle = np.angle(np.mean(np.exp(2j * np.pi * turns))) / (2.0 * np.pi)
+    phase = np.mod(turns - middle + 0.5, 1.0) - 0.5
+    phase = np.mod(phase - np.median(phase) + 0.5, 1.0) - 0.5
+    size = np.abs(phase)
+    largest = size > np.quantile(size, 1.0 - _LARGEST)
+    late_part = float(np.mean(phase[largest] > 0.0))
+    if late_part <= 0.5 or np.std(phase) == 0.0:
+        return 0.0
+    relation = float(np.clip(np.corrcoef(phase[1:], phase[:-1])[0, 1], 0.0, 0.999))
+    independent = np.count_nonzero(largest) * (1.0 - relation) / (1.0 + relation)
+    return float(independent) * _relative_entropy(late_part, 0.5)
+
+
+def _relative_entropy(part: float, ordinary: float) -> float:
+    """Nats a trial for a frequency above the ordinary one, 0 for one below."""
+    if part <= ordinary:
+        return 0.0
+    rest = 0.0 if part >= 1.0 else (1.0 - part) * math.log((1.0 - part) / (1.0 - ordinary))
+    return part * math.log(part / ordinary) + rest

@@ -1,0 +1,152 @@
+"""What tells a step of a clock from a loss of samples: receipt, order, values and the recording's end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.check.stamps.common_clock import ORDINARY
+from rig_identification.check.stamps.regular import usual_interval
+from rig_identification.check.stamps.streams import SECOND, Stream
+
+Array = NDArray[np.float64]
+
+#: Samples on either side over which a step must last: a stall of 0.1 s at 500 Hz holds 50.
+LASTING = 64
+#: A message in twenty at most comes out of order: nats for each that would have to.
+_OUT_OF_ORDER = math.log(20.0)
+#: s; latencies may change by this much from one moment to the next.
+_LATENCY_CHANGE = 0.005
+#: s, std of the end of one stream against the others': a recorder stops for all at once, within an interval.
+_END = 0.05
+#: Moments at which the values' changes are taken to see how much is usual.
+_MOMENTS = 300
+#: Samples averaged on either side of a jump.
+_MEAN = 3
+#: Nats beyond which one source of evidence is not counted: its own model is not that sure.
+_CAP = 100.0
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A place where a stream's stamps jump."""
+
+    stream: Stream
+    after: int  # index of the first message after it
+    interval: float  # s, of sampling
+    size: float  # s, by which the stamps lead on beyond an interval; negative: back
+
+
+def lasting_jumps(stream: Stream) -> list[Jump]:
+    """Places where the stamps lead back over two intervals, or on over five and 20 ms, and stay there."""
+    times = (stream.stamps - stream.stamps[0]) / SECOND
+    steps = np.diff(times)
+    interval = usual_interval(times)
+    if interval <= 0.0:
+        return []
+    size = steps - interval
+    places = np.flatnonzero((size < -2.0 * interval) & (steps < 0) | (size > max(5.0 * interval, 0.02)))
+    if not len(places):
+        return []
+    lag = min(LASTING, len(times) // 4)
+    usual = float(np.median(times[lag:] - times[:-lag]))
+    result = []
+    for place in places.tolist():
+        first, last = max(place + 1 - lag, 0), min(place + 1, len(times) - lag)
+        if last - first >= 10:
+            across = float(np.median(times[first + lag : last + lag] - times[first:last])) - usual
+            if 0.5 < across / size[place] < 1.5:
+                result.append(Jump(stream, place + 1, interval, float(size[place])))
+    return result
+
+
+def by_order(jump: Jump) -> float:
+    """Nats for a step back: each message stamped before what came earlier would be out of order."""
+    before = stamps_max(jump)
+    after = jump.stream.stamps[jump.after :]
+    return min(float(np.count_nonzero(after <= before)) * _OUT_OF_ORDER, _CAP) if jump.size < 0 else 0.0
+
+
+def stamps_max(jump: Jump) -> int:
+    """ns, the last stamp before the jump."""
+    first = max(jump.after - LASTING, 0)
+    return int(jump.stream.stamps[first : jump.after].max())
+
+
+def by_receipt(jump: Jump) -> float:
+    """Nats for a step of the stamps against receive times that go on; none where both step."""
+    ahead = (jump.stream.stamps - jump.stream.received).astype(np.float64) / SECOND
+    before, after = (
+        ahead[max(jump.after - LASTING, 0) : jump.after], ahead[jump.after : jump.after + LASTING]
+    )  # fmt: skip
+    change = float(np.median(after) - np.median(before))
+    spread = max(1.5 * float(np.median(np.abs(before - np.median(before)))), _LATENCY_CHANGE)
+    seen, left = change / spread, (change - jump.size) / spread
+    return float(np.clip(0.5 * (seen**2 - left**2), 0.0, _CAP))
+
+
+def by_ends(jump: Jump, others: list[Stream]) -> float:
+    """Nats for the stream's start and end to lie with those of streams without a jump, once it is undone.
+
+    Ordinary differences at the start are Gaussian with a fifth of what a recorder may take to subscribe.
+    """
+    if not others:
+        return 0.0
+    first, last = (int(np.median([int(f(s.stamps)) for s in others])) for f in (np.min, np.max))
+    start = (int(jump.stream.stamps.min()) - first) / SECOND
+    end = (int(jump.stream.stamps[jump.after :].max()) - last) / SECOND
+    at_end = 0.5 * (end**2 - (end - jump.size) ** 2) / _END**2
+    at_start = 0.5 * (start**2 - (start + jump.size) ** 2) / (ORDINARY / 5.0) ** 2
+    return float(np.clip(max(at_end, at_start), -_CAP, _CAP))
+
+
+def by_values(jumps: list[Jump]) -> float:
+    """Nats for the values to go on over a jump as from one sample to the next, and not as over its length.
+
+    Changes of all columns over both are Gaussian, with the covariances that they have elsewhere in the
+    recording; what columns tell in common so counts once. At rest the two are alike and nothing is told.
+    """
+    short, long, seen = [], [], []
+    low = max(float(j.stream.stamps.min()) for j in jumps)
+    high = min(float(j.stream.stamps.max()) for j in jumps)
+    for jump in jumps:
+        columns = jump.stream.channel.values
+        columns = columns[:, np.isfinite(columns).all(axis=0)]
+        size = round(jump.size / jump.interval)
+        if (
+            not columns.shape[1]
+            or len(columns) < 2 * (size + 2 * _MEAN)
+            or not _MEAN < jump.after < len(columns) - _MEAN
+        ):
+            continue
+        sums = np.concatenate((np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)))
+        mean = (sums[_MEAN:] - sums[:-_MEAN]) / _MEAN
+        moments = np.linspace(low, high, _MOMENTS)
+        where = np.clip(np.searchsorted(jump.stream.stamps, moments), 0, len(mean) - size - _MEAN - 1)
+        short.append(mean[where + _MEAN] - mean[where])
+        long.append(mean[where + _MEAN + size] - mean[where])
+        seen.append(mean[jump.after] - mean[jump.after - _MEAN])
+    if not seen:
+        return 0.0
+    return float(np.clip(_ratio(np.hstack(short), np.hstack(long), np.concatenate(seen)), -_CAP, _CAP))
+
+
+def _ratio(short: Array, long: Array, seen: Array) -> float:
+    """Log ratio of the likelihoods of a change ``seen`` under the laws of two samples of changes."""
+    scale = np.std(long, axis=0)
+    moving = scale > 0.0
+    short, long, seen = (
+        short[:, moving] / scale[moving],
+        long[:, moving] / scale[moving],
+        seen[moving] / scale[moving],
+    )
+    if not len(seen):
+        return 0.0
+    ridge = 1e-6 * np.eye(len(seen))
+    near, far = (d.T @ d / len(d) + ridge for d in (short, long))
+    volume = 0.5 * (np.linalg.slogdet(far)[1] - np.linalg.slogdet(near)[1])
+    distance = 0.5 * (seen @ np.linalg.solve(near, seen) - seen @ np.linalg.solve(far, seen))
+    return float(volume - distance)

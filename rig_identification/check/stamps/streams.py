@@ -1,0 +1,101 @@
+"""The stamps of one topic of one bag as the examiners of stamps see them, and a session with other stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.raw import RawChannel, RawRecording, RawSession, Stamps
+
+Array = NDArray[np.float64]
+
+SECOND = 1_000_000_000
+#: With fewer stamps no regularity can be told from chance.
+FEWEST = 20
+#: Written by a simulator, never an input: it is mended along with the devices and told of by nobody.
+GROUND_TRUTH = "ground_truth"
+
+
+@dataclass(frozen=True)
+class Stream:
+    """One topic of one bag."""
+
+    place: int  # of the recording in the session
+    recording: str
+    channel: RawChannel
+
+    @property
+    def device(self) -> str:
+        """Contract word of the device."""
+        return self.channel.device
+
+    @property
+    def stamps(self) -> Stamps:
+        """(n,) ns, in the order of the file."""
+        return self.channel.stamp_ns
+
+    @property
+    def received(self) -> Stamps:
+        """(n,) ns, in the order of the file."""
+        return self.channel.received_ns
+
+    def with_stamps(self, stamps: Stamps) -> Stream:
+        """This stream with other stamps (n,), ns."""
+        return replace(self, channel=replace(self.channel, stamp_ns=stamps))
+
+    @property
+    def key(self) -> tuple[int, str]:
+        """What tells this stream from the session's others."""
+        return self.place, self.channel.topic
+
+
+def streams(session: RawSession, place: int | None = None) -> Iterator[Stream]:
+    """Streams with enough stamps to judge, of one recording or of all."""
+    for number, recording in enumerate(session.recordings):
+        if place in (None, number):
+            for channel in recording.channels:
+                if len(channel.stamp_ns) >= FEWEST:
+                    yield Stream(number, recording.name, channel)
+
+
+def with_stamps(session: RawSession, stamps: Mapping[tuple[int, str], Stamps]) -> RawSession:
+    """The session with other stamps (ns) in the streams of these keys."""
+
+    def changed(channel: RawChannel, key: tuple[int, str]) -> RawChannel:
+        return replace(channel, stamp_ns=np.asarray(stamps[key], np.int64)) if key in stamps else channel
+
+    return _changed(session, changed)
+
+
+def reversed_streams(session: RawSession, keys: frozenset[tuple[int, str]]) -> RawSession:
+    """The session with the messages of these streams in the opposite order."""
+
+    def changed(channel: RawChannel, key: tuple[int, str]) -> RawChannel:
+        if key not in keys:
+            return channel
+        return replace(
+            channel, stamp_ns=channel.stamp_ns[::-1], received_ns=channel.received_ns[::-1],
+            values=channel.values[::-1],
+        )  # fmt: skip
+
+    return _changed(session, changed)
+
+
+def without(session: RawSession, keys: frozenset[tuple[int, str]]) -> RawSession:
+    """The session without the streams of these keys."""
+    recordings = tuple(
+        replace(r, channels=tuple(c for c in r.channels if (place, c.topic) not in keys))
+        for place, r in enumerate(session.recordings)
+    )
+    return replace(session, recordings=recordings)
+
+
+def _changed(session: RawSession, change: Callable[[RawChannel, tuple[int, str]], RawChannel]) -> RawSession:
+    recordings: list[RawRecording] = []
+    for place, recording in enumerate(session.recordings):
+        channels = tuple(change(channel, (place, channel.topic)) for channel in recording.channels)
+        recordings.append(replace(recording, channels=channels))
+    return replace(session, recordings=tuple(recordings))
