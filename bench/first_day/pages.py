@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.first_day.bases import bases
-from bench.first_day.faults import all_cases
+from bench.first_day.faults import GROUPS, all_cases
 from bench.first_day.faults.base import Case, devices
 from bench.first_day.judge import marked
 from bench.first_day.sessions import DEFAULT_CACHE
@@ -52,7 +52,7 @@ def examples(sessions: Sequence[RawSession]) -> dict[tuple[str, ...], tuple[RawS
         for case in all_cases(raw):
             if not case.untellable:
                 found.setdefault(kind(raw, case), (raw, case))
-    return dict(sorted(found.items(), key=lambda item: item[0][0] != "unit"))
+    return dict(sorted(found.items(), key=lambda item: GROUPS.index(item[0][0])))
 
 
 def kind(raw: RawSession, case: Case) -> tuple[str, ...]:

@@ -67,8 +67,13 @@ def _print_indented(console: Console, text: Text) -> None:
 
 
 def _rest_table(view: SetupView) -> Table:
+    title = "Readings at rest" + (
+        ", with the faults above put right where they can be" if view.faults else ""
+    )
     table = _table(
-        "Readings at rest", ("recording", "reading"), ("measured", "expected", "unit", "off by, σ")
+        f"Readings at rest{corrected}",
+        ("recording", "reading"),
+        ("measured", "expected", "unit", "off by, σ"),
     )
     for row in view.rest:
         off = Text(plain_number(row.off), "bold red" if row.is_far else "")
