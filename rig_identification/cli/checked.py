@@ -68,8 +68,8 @@ def _print_indented(console: Console, text: Text) -> None:
 
 def _rest_table(view: SetupView) -> Table:
     corrected = ", with the faults above put right where they can be" if view.faults else ""
-    numbers = ("measured", "expected", "unit", "off by, σ")
-    table = _table(f"Readings at rest{corrected}", ("recording", "reading"), numbers)
+    columns = ("measured", "expected", "unit", "off by, σ")
+    table = _table(f"Readings at rest{corrected}", ("recording", "reading"), columns)
     for row in view.rest:
         off = Text(plain_number(row.off), "bold red" if row.is_far else "")
         numbers = [Text(plain_number(text)) for text in (row.measured, row.expected)]
