@@ -23,6 +23,9 @@ from session_samples import edit_yaml, make_recording, rewrite, write_single
 
 from rig_identification.errors import InputError
 from rig_identification.raw import RawRecording
+from rig_identification.recording import Session
+from rig_identification.report import render_report
+from rig_identification.result import Identification
 from rig_identification.session import clean, read_raw, read_session
 from rig_identification.session.messages import TYPESTORE
 from rig_identification.session.unpacking import Damaged, most_unpacked, unpacked, zstd
@@ -628,8 +631,14 @@ def test_any_damage_is_read_or_refused_in_one_line(
         assert isinstance(read, RawRecording) or "\n" not in read
 
 
-def test_how_a_bag_was_read_reaches_the_report(copied: Any) -> None:
+def test_how_a_bag_was_read_reaches_the_report(
+    copied: Any, session: Session, identification: Identification
+) -> None:
     folder = copied()
     (folder / "dynamic_2" / "metadata.yaml").unlink()
     (recording,) = read_session(folder).recordings
     assert recording.notes == read_one(folder).notes != ()
+    first = dataclasses.replace(session.recordings[0], notes=recording.notes)
+    noted = dataclasses.replace(session, recordings=(first, *session.recordings[1:]))
+    assert f"<li>{recording.notes[0].replace(chr(39), '&#39;')}</li>" in render_report(identification, noted)
+    assert recording.notes[0][:20] not in render_report(identification, session)

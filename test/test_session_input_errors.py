@@ -118,6 +118,16 @@ RIG_FAULTS = [
     (put("tolerance", "cable_lenght", value=0.1), "tolerance.cable_lenght: unknown key; known are cable_l"),
     (put("tolerance", "clock", value=-0.1), "tolerance.clock: -0.1 SI must be at least 0"),
     (put("tolerance", value=3), "tolerance: 3 is not a mapping"),
+    (put("gravity", value="9,81"), "gravity: '9,81' is not a number; did you mean 9.81?"),
+    (put("gravity", value="\u22129.81"), "is not a number; did you mean -9.81?"),
+    (put("mass", value="1,240.5"), "mass: '1,240.5' is not a number; did you mean 1240.5?"),
+    (put("mass", value="1240 kg"), "'1240 kg' is not a number; did you mean 1240. give the number alone"),
+    (put("cable_1", "length", value="2,5e0"), "cable_1.length: '2,5e0' is not a number; did you mean 2.5e0?"),
+    (put("cable_2", "body_point", value=[1, 25, 0.5, 0.5]), "has 4 numbers; .*is a comma a decimal point"),
+    (put("cable_2", "body_point", value="1.0, 2.0, 0.5"), r"write it in brackets: \[1.0, 2.0, 0.5\]"),
+    (put("cable_2", "load_cell", value="cieling"), "give ceiling or body; did you mean ceiling?"),
+    (put("cables", value=["cable_1", "cabel_2", "cable_3"]), "cabel_2 is listed but.*did you mean cable_2?"),
+    (put("noise", "tensoin", value=2.0), "noise.tensoin: unknown key; .*; did you mean tension?"),
 ]  # fmt: skip
 
 
@@ -137,6 +147,26 @@ def test_a_misspelt_key_in_place_of_the_right_one(folder: Path) -> None:
     edit_yaml(folder / "rig.yaml", rename)
     message = refusal(lambda: read_rig(folder / "rig.yaml"))
     assert message.endswith("inclinometre: unknown key; did you mean inclinometer?")
+
+
+def test_a_key_in_capitals(folder: Path) -> None:
+    """Otherwise the IMU would not be mounted, without a word."""
+
+    def rename(document: dict[str, Any]) -> None:
+        parameters = document["/**"]["ros__parameters"]
+        parameters["IMU"] = parameters.pop("imu")
+
+    edit_yaml(folder / "rig.yaml", rename)
+    message = refusal(lambda: read_rig(folder / "rig.yaml"))
+    assert message.endswith("IMU: unknown key; did you mean imu?")
+
+
+@pytest.mark.parametrize("written", ["1,25", "+1,25", "-0,5e-3"])
+def test_a_decimal_comma_as_people_write_it(folder: Path, written: str) -> None:
+    file = folder / "rig.yaml"
+    file.write_text(file.read_text().replace("gravity: 9.80665", f"gravity: {written}"))
+    point = written.replace(",", ".")
+    assert f"'{written}' is not a number; did you mean {point}?" in refusal(lambda: read_rig(file))
 
 
 def first(**changes: object) -> Edit:
@@ -175,6 +205,10 @@ SESSION_FAULTS = [
     (first(dummy={"mass": 50.0}), r"recordings\[0\].dummy.position: missing"),
     (first(dummy={"mass": 5.0, "position": [300.0, 0.0, 0.0]}), r"dummy.position\[0\]: 300 m is beyond"),
     (first(dummy=50.0), r"recordings\[0\].dummy: 50.0 is not a mapping"),
+    (first(kind="Static"), "give static or dynamic; did you mean static?"),
+    (first(dummy={"mass": 50, 25: None, "position": [0.0] * 3}), "dummy: 25 stands alone; is a comma before"),
+    (first(dumy={}), "unknown key; .*did you mean dummy?"),
+    (lambda document: document.update(rig="rigg.yaml"), "does not exist; did you mean rig.yaml?"),
     (lambda document: document["recordings"].__delitem__(slice(0, 2)), "every recording is held out"),
 ]
 
@@ -196,16 +230,24 @@ def test_faults_of_the_session_description(folder: Path, edit: Edit, said: str) 
         ("rig.yaml", "gravity: 9.8", "rig.yaml: ros__parameters: missing"),
         ("rig.yaml", "/a: {ros__parameters: {}}\n/b: {ros__parameters: {}}", "given for /a, /b; keep one"),
         ("rig.yaml", "\x00\x01", "rig description is not valid YAML"),
+        ("rig.yaml", "/**:\n\tros__parameters: {}", "line 2: found character '\\t'"),
+        ("rig.yaml", "/**:\n\tros__parameters: {}", "indent with spaces"),
+        ("rig.yaml", "/**: {ros_parameters: {}}", "missing; .*ros_parameters has another spelling"),
     ],
 )
 def test_files_that_are_no_description(folder: Path, file: str, text: str, said: str) -> None:
     (folder / file).write_text(text)
-    assert said in refusal(lambda: read_session(folder))
+    assert re.search(re.escape(said).replace(r"\.\*", ".*"), refusal(lambda: read_session(folder)))
+
+
+def test_a_description_of_another_encoding(folder: Path) -> None:
+    (folder / "rig.yaml").write_bytes("# für den Prüfstand".encode("latin-1"))
+    assert "rig description is no text in UTF-8; save it as UTF-8" in refusal(lambda: read_session(folder))
 
 
 def test_a_session_that_is_not_there(tmp_path: Path) -> None:
     assert "session does not exist" in refusal(lambda: read_session(tmp_path / "gone"))
-    assert "session description does not exist" in refusal(lambda: read_session(tmp_path))
+    assert "holds neither a session.yaml nor a bag" in refusal(lambda: read_session(tmp_path))
 
 
 def test_a_room_surveyed_from_afar_is_read(folder: Path) -> None:

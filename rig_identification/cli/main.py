@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from rig_identification import __version__
 from rig_identification.cli import commands
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, MissingDescription
 
 PROGRAM = "rig-identification"
 
@@ -75,9 +75,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments.run(arguments)
     except InputError as error:
         _say(f"error: {error}")
+        if isinstance(error, MissingDescription):
+            _show(error.proposal)
         return UNUSABLE
     except BrokenPipeError:  # whoever read the output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
     except KeyboardInterrupt:
         _say("interrupted")
         return INTERRUPTED
@@ -92,6 +94,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _say(message: str) -> None:
     """One line, whatever the message holds."""
     print(f"{PROGRAM}: {' '.join(message.split())}", file=sys.stderr)
+
+
+def _show(text: str) -> None:
+    """Text on standard output, for whoever still reads it."""
+    try:
+        print(text, end="", flush=True)
+    except BrokenPipeError:
+        _print_no_more()
+
+
+def _print_no_more() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _accept_any_terminal() -> None:

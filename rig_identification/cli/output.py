@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -19,18 +20,31 @@ def check_output_folder(folder: Path, names: tuple[str, ...]) -> None:
     ------
     InputError
     """
+    try:
+        _check(folder, names)
+    except (OSError, ValueError) as error:  # a name that no file system takes
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise InputError(f"--out {folder}: {reason or error}; name another folder") from error
+
+
+def _check(folder: Path, names: tuple[str, ...]) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: is a file; name a folder")
+    if folder.is_symlink() and not folder.exists():
+        raise InputError(f"--out {folder}: is a link to nothing; name another folder, or remove it")
     for name in names:
         if (folder / name).is_dir():
             raise InputError(f"--out {folder}: {name} in it is a folder; name another folder, or remove it")
     parent = _nearest_existing(folder)
     if not parent.is_dir():
         raise InputError(f"--out {folder}: {parent} is a file; name another folder")
-    if not os.access(parent, os.W_OK | os.X_OK):
+    try:  # Permissions do not tell of a full disk, a quota or a file system that is read-only.
+        Path(tempfile.mkdtemp(prefix=".", suffix=".part", dir=parent)).rmdir()
+    except OSError as error:
+        reason = error.strerror or error
         raise InputError(
-            f"--out {folder}: {parent} is not writable; name another folder or change its permissions"
-        )
+            f"--out {folder}: {parent} is not writable ({reason}); name another folder, or free it"
+        ) from error
 
 
 def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, did_you_mean
 from rig_identification.live.plant_effects import PlantEffects, Rider, YieldingCeiling
 from rig_identification.live.push import Push
 from rig_identification.model import layout
@@ -132,7 +132,8 @@ def effects_of(
     known = {switch.name for switch in SWITCHES}
     for name in given:
         if name not in known:
-            raise InputError(f"{prefix}{name}: is unknown; known are {', '.join(sorted(known))}")
+            near = did_you_mean(name, known)
+            raise InputError(f"{prefix}{name}: is unknown; known are {', '.join(sorted(known))}{near}")
     values = {s.name: s.checked(given.get(s.name, s.default), model.cables, prefix) for s in SWITCHES}
 
     def number(name: str) -> float:

@@ -11,10 +11,10 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, did_you_mean
 from rig_identification.session.bag_files import BagFiles, bag_files, opened
 from rig_identification.session.contents import Contents
-from rig_identification.session.fields import close_match, one_line
+from rig_identification.session.fields import one_line
 from rig_identification.session.mcap_storage import collect_mcap
 from rig_identification.session.raw_topic import RawTopic
 from rig_identification.session.rosbag1_storage import collect_rosbag1
@@ -50,12 +50,14 @@ def read_bag(path: Path, wanted: Collection[str]) -> Bag:
         beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
         raise InputError(
             f"{path}: bag does not exist; correct its path in session.yaml or copy it there"
-            f"{close_match(path.name, beside)}"
+            f"{did_you_mean(path.name, beside)}"
         )
     try:
         return _read(path, bag_files(path), wanted)
     except InputError:
         raise
+    except OSError as err:
+        raise InputError(f"{path}: bag cannot be read ({err.strerror or one_line(err)})") from err
     except MemoryError as err:
         raise InputError(f"{path}: bag is larger than this machine's memory; split it") from err
     except Exception as err:  # a damaged file fails in as many ways as there are parsers

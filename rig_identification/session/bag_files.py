@@ -55,7 +55,7 @@ def bag_files(path: Path) -> BagFiles:
     here = [file for file in sorted(path.iterdir(), key=_by_number) if is_bag_file(file)]
     named = [file for name in metadata.files if (file := path / name).is_file()]
     missing = [name for name in metadata.files if not (path / name).is_file()]
-    files = named or _without_copies(here)
+    files = named or without_copies(here)
     if not files:
         what = (
             f"{METADATA} names {', '.join(missing)}, which is missing: copy it" if missing else "record anew"
@@ -106,7 +106,7 @@ def opened(path: Path) -> Iterator[tuple[Path, str, list[str]]]:
         yield inner, kind_of(inner), [] if whole else ["is truncated: it was unpacked as far as it goes"]
 
 
-def _without_copies(files: list[Path]) -> list[Path]:
+def without_copies(files: list[Path]) -> list[Path]:
     """Players unpack a compressed file beside itself: then the unpacked one alone."""
     names = {file.name for file in files}
     return [f for f in files if not (f.name.endswith(_ZSTD) and f.name.removesuffix(_ZSTD) in names)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -13,26 +14,16 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from rig_identification.errors import InputError
-
-#: Share of letters alike, as difflib counts them, from which a word is taken for another one misspelt: two
-#: letters swapped or one wrong in a word of five.
-CLOSE = 0.75
+from rig_identification.errors import InputError, did_you_mean
 
 #: A quaternion further than this from norm 1 is a typing error, not rounding.
 QUATERNION_NORM_TOLERANCE = 1e-3
+_SIGN, _POWER = "[+-]?", r"(?:[eE][+-]?\d+)?"
 
 
 def one_line(text: object) -> str:
     """``text`` on one line, for messages that quote another library."""
     return " ".join(str(text).split())
-
-
-def close_match(word: str, known: Iterable[str]) -> str:
-    """Ending of a message that names the word of ``known`` that ``word`` may be misspelt from, or nothing."""
-    by_lower = {name.lower(): name for name in known}
-    close = get_close_matches(word.lower(), by_lower, n=1, cutoff=CLOSE)
-    return f"; did you mean {by_lower[close[0]]}?" if close else ""
 
 
 @dataclass(frozen=True)
@@ -85,9 +76,13 @@ class Fields:
         """(size,) finite numbers at ``key``, each at most ``limit`` in magnitude."""
         value = self.require(key, f"{size} numbers in {unit}")
         if not isinstance(value, list):
-            raise self.fault(key, f"{value!r} is not a list; give {size} numbers in {unit}")
+            hint = f"; write it in brackets: [{value}]" if isinstance(value, str) else ""
+            raise self.fault(key, f"{value!r} is not a list; give {size} numbers in {unit}{hint}")
         if len(value) != size:
-            raise self.fault(key, f"has {len(value)} numbers; give {size} in {unit}")
+            # 1,25 in a list is two whole numbers.
+            whole = sum(isinstance(item, int) for item in value)
+            hint = "; is a comma a decimal point? write 1.25" if len(value) > size and whole > 1 else ""
+            raise self.fault(key, f"has {len(value)} numbers; give {size} in {unit}{hint}")
         vector = np.array([self._finite(f"{key}[{i}]", item) for i, item in enumerate(value)])
         worst = int(np.argmax(np.abs(vector)))
         if abs(vector[worst]) > limit:
@@ -111,7 +106,8 @@ class Fields:
         words = tuple(allowed)
         value = self.values.get(key, default)
         if value not in words:
-            raise self.fault(key, f"{value!r} is unknown; give {' or '.join(words)}")
+            near = did_you_mean(str(value), words)
+            raise self.fault(key, f"{value!r} is unknown; give {' or '.join(words)}{near}")
         return str(value)
 
     def section(self, key: str, what: str) -> Fields:
@@ -130,22 +126,47 @@ class Fields:
         names = tuple(known)
         for key in self.values:
             if key not in names:
-                raise self.fault(str(key), f"unknown key; known are {', '.join(names)}")
+                self._refuse_half_a_number(key)
+                near = did_you_mean(str(key), names)
+                raise self.fault(str(key), f"unknown key; known are {', '.join(names)}{near}")
 
     def refuse_misspelt(self, known: Iterable[str]) -> None:
         """InputError for a key that looks like one of ``known`` misspelt; others belong to other tools."""
         names = tuple(known)
         for key in self.values:
-            close = get_close_matches(str(key), names, n=1, cutoff=0.8)
+            self._refuse_half_a_number(key)
+            close = get_close_matches(str(key).lower(), names, n=1, cutoff=0.8)
             if key not in names and close and close[0] not in self.values:
                 raise self.fault(str(key), f"unknown key; did you mean {close[0]}?")
 
+    def _refuse_half_a_number(self, key: object) -> None:
+        """InputError for what YAML makes of ``{mass: 50,25}``: a key 25 without a value."""
+        if isinstance(key, (int, float)) and self.values[key] is None:  # type: ignore[index]
+            raise self.fault(
+                "", f"{key} stands alone; is a comma before it a decimal point? write 1.25 for 1,25"
+            )
+
     def _finite(self, key: str, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.fault(key, f"{value!r} is not a number")
+            raise self.fault(key, f"{value!r} is not a number{number_hint(value)}")
         if not math.isfinite(value):
             raise self.fault(key, f"{value} is not finite")
         return float(value)
+
+
+def number_hint(value: object) -> str:
+    """Ending of a message that says which number a text may mean, or nothing."""
+    if not isinstance(value, str):
+        return ""
+    text = value.strip().replace("\N{MINUS SIGN}", "-")
+    if re.fullmatch(rf"{_SIGN}\d+,\d+{_POWER}", text):
+        return f"; did you mean {text.replace(',', '.')}? a decimal point is a point"
+    if re.fullmatch(rf"{_SIGN}\d{{1,3}}([, ']\d{{3}})+(\.\d*)?", text):
+        joined = re.sub("[, ']", "", text)
+        return f"; did you mean {joined}? write thousands without a sign between"
+    if found := re.match(rf"({_SIGN}(\d+\.?\d*|\.\d+){_POWER})\s*\S*$", text):
+        return f"; did you mean {found[1]}? give the number alone"
+    return ""
 
 
 def load_fields(file: Path, what: str) -> Fields:
@@ -153,8 +174,12 @@ def load_fields(file: Path, what: str) -> Fields:
     try:
         text = file.read_text(encoding="utf-8")
     except FileNotFoundError as err:
-        raise InputError(f"{file}: {what} does not exist") from err
-    except (OSError, UnicodeDecodeError) as err:
+        beside = [other.name for other in file.parent.iterdir()] if file.parent.is_dir() else []
+        near = did_you_mean(file.name, beside)
+        raise InputError(f"{file}: {what} does not exist{near}") from err
+    except UnicodeDecodeError as err:
+        raise InputError(f"{file}: {what} is no text in UTF-8; save it as UTF-8") from err
+    except OSError as err:
         raise InputError(one_line(f"{file}: {what} cannot be read: {err}")) from err
     try:
         # The pure loader is YAML 1.2: 1e-3 is a number, and a key given twice is a fault.
@@ -171,4 +196,5 @@ def _first_fault(err: Exception) -> str:
     mark, problem = getattr(err, "problem_mark", None), getattr(err, "problem", None)
     if mark is None or problem is None:
         return str(err)
-    return f"line {mark.line + 1}: {problem}"
+    hint = "; indent with spaces" if "'\\t'" in problem else ""
+    return f"line {mark.line + 1}: {problem}{hint}"

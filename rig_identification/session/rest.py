@@ -44,16 +44,26 @@ def check_rest(recording: Recording, rig: Rig, where: str) -> None:
     InputError
         Names ``where`` (the bag), channel, value, limit and what to do.
     """
+    motion = first_motion(recording, rig)
+    if motion is not None:
+        raise InputError(
+            f"{where}: static recording moves: {motion}; let the body settle and record again, "
+            "or make it kind: dynamic"
+        )
+
+
+def first_motion(recording: Recording, rig: Rig) -> str | None:
+    """What swings or drifts beyond its limit, by how much; None where the body hangs at rest."""
     for signal in _signals(recording, rig):
         motion = slow_motion(signal.series.time, signal.series.values[:, signal.columns])
         axis = int(np.argmax(motion))
         if motion[axis] > signal.limit:
             label = f"{signal.name} {'xyz'[axis]}" if motion.size > 1 else signal.name
-            raise InputError(
-                f"{where}: static recording moves: {label} varies by {motion[axis]:.3g} {signal.unit} rms, "
-                f"limit {signal.limit:.3g} {signal.unit}; let the body settle and record again, "
-                "or make it kind: dynamic"
+            return (
+                f"{label} varies by {motion[axis]:.3g} {signal.unit} rms, "
+                f"limit {signal.limit:.3g} {signal.unit}"
             )
+    return None
 
 
 def slow_motion(time: Array, values: Array) -> Array:

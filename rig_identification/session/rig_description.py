@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, did_you_mean
 from rig_identification.rig import DEFAULT_TOLERANCE, NOISE_NAMES, Cable, CarryingFrame, Mount, Rig
 from rig_identification.session.fields import Fields, load_fields
 from rig_identification.session.topics import DEVICES
@@ -92,11 +92,19 @@ def _parameters(root: Fields) -> Fields:
     if not nodes:
         raise InputError(
             f"{root.file}: ros__parameters: missing; a rig description starts '/**:' 'ros__parameters:'"
+            f"{_underscores(root)}"
         )
     if len(nodes) > 1:
         raise InputError(f"{root.file}: ros__parameters: given for {', '.join(map(str, nodes))}; keep one")
     section = root.section(nodes[0], "a node's parameters").section("ros__parameters", "the parameters")
     return Fields(root.file, "", section.values)
+
+
+def _underscores(root: Fields) -> str:
+    """Ending of a message where ``ros__parameters`` is misspelt, mostly with one underscore."""
+    keys = [str(key) for value in root.values.values() if isinstance(value, dict) for key in value]
+    near = did_you_mean("ros__parameters", keys).partition("mean ")[2].rstrip("?")
+    return f"; {near} has another spelling" if near else ""
 
 
 def _cable_names(top: Fields) -> list[str]:
@@ -112,7 +120,9 @@ def _cable_names(top: Fields) -> list[str]:
             raise top.fault("cables", f"{name} is the name of another part of the rig; rename the cable")
         if not top.has(name):
             raise top.fault(
-                "cables", f"{name} is listed but not described; add {name} with {', '.join(_CABLE_KEYS)}"
+                "cables",
+                f"{name} is listed but not described; add {name} with {', '.join(_CABLE_KEYS)}"
+                f"{did_you_mean(name, set(map(str, top.values)) - set(names))}",
             )
     for key, value in top.values.items():
         if (

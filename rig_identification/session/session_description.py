@@ -8,6 +8,7 @@ from pathlib import Path
 from rig_identification.errors import InputError
 from rig_identification.recording import Dummy
 from rig_identification.session.fields import Fields, load_fields
+from rig_identification.session.not_a_session import check_description, description_file
 from rig_identification.session.rig_description import LARGEST_LENGTH, LENGTH_HINT
 
 _KEYS = ("bag", "kind", "holdout", "dummy")
@@ -38,13 +39,14 @@ def read_session_description(path: Path) -> SessionDescription:
 
     Raises
     ------
+    MissingDescription
+        A folder of bags without a session.yaml.
     InputError
         The first fault, as one line with file, key path, value and what to do.
     """
-    if not path.exists():
-        raise InputError(f"{path}: session does not exist; give its folder or its session.yaml")
-    file = path / "session.yaml" if path.is_dir() else path
+    file = description_file(path)
     top = load_fields(file, "session description")
+    check_description(top)
     top.refuse_misspelt(("rig", "recordings"))
     rig = top.require("rig", "the rig description's path")
     listed = top.require("recordings", "the list of bags")

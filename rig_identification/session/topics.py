@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, did_you_mean
 from rig_identification.rig import Rig
-from rig_identification.session.fields import close_match
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 DEFAULT_NAMESPACE = "/rig"
@@ -66,7 +65,7 @@ def expected_topics(
         if short not in contract:
             raise InputError(
                 f"topic mapping: {key} is no topic of this rig; known are {', '.join(contract)}"
-                f"{close_match(short, contract)}"
+                f"{did_you_mean(short, contract)}"
             )
         names[short] = bag_name if bag_name.startswith("/") else f"/{bag_name}"
     topics = {names[name]: Topic(names[name], *contract[name]) for name in contract}
@@ -107,7 +106,7 @@ def check_mapped(
         alike = sorted(other for other, its in held.items() if its == kind)
         there = f"of type {kind} they hold {', '.join(alike)}" if alike else f"none holds a {kind}"
         raise InputError(
-            f"--topic {key}={given}: no bag holds {name}; {there}{close_match(name, alike or held)}"
+            f"--topic {key}={given}: no bag holds {name}; {there}{did_you_mean(name, alike or held)}"
         )
 
 

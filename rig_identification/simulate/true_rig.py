@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import truncnorm
 
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, did_you_mean
 from rig_identification.estimate.parameters import INERTIAL, UNKNOWN_ROTATION, ParameterSet, parameter_set
 from rig_identification.live.plant_effects import PlantEffects, with_effects
 from rig_identification.live.plant_switches import SWITCHES, effects_of
@@ -110,7 +110,8 @@ def _with_device_errors(true: TrueRig, spec: SessionSpec) -> TrueRig:
             continue
         if name not in errors:
             known = ", ".join(sorted([*_SWITCHED, *errors]))
-            raise InputError(f"effect {name}: is unknown; known are {known}")
+            near = did_you_mean(name, [*_SWITCHED, *errors])
+            raise InputError(f"effect {name}: is unknown; known are {known}{near}")
         if len(given) != 1 or not np.isfinite(given[0]):
             raise InputError(f"effect {name}: give one finite number")
         device[errors[name]] += given[0]

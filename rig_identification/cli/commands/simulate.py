@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 
 from rig_identification.cli.cases import case_named
 from rig_identification.cli.effects import effects_given
+from rig_identification.cli.output import check_output_folder
 from rig_identification.cli.simulated import write_simulated
 from rig_identification.cli.swings import swing_line, swings
 from rig_identification.errors import InputError
@@ -104,6 +105,7 @@ def run(arguments: argparse.Namespace) -> None:
 
     from rig_identification.simulate import simulate_session
 
+    check_output_folder(arguments.out, ())
     if arguments.out.exists() and not arguments.overwrite:
         raise InputError(f"--out {arguments.out}: exists already; name another folder, or give --overwrite")
     spec = specification(arguments)
