@@ -1,0 +1,142 @@
+"""Single samples far off: one to three in one device only, the signal goes on as before.
+
+What the body does is seen by several devices or rings for more than three samples, and a cable that snaps
+does so from slack. Static electricity and damaged bytes do neither.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import binom
+
+from rig_identification.check.found import Found
+from rig_identification.check.readings.channel_model import Flags, channels_of, runs
+from rig_identification.check.readings.outliers import OUTLIER, Outliers, outliers
+from rig_identification.check.readings.telling import (
+    Spotted,
+    corrected,
+    devices_of,
+    listed,
+    of_recordings,
+    spans_of,
+    start_ns,
+    together,
+    where,
+    without,
+)
+from rig_identification.examination import SetupFault
+from rig_identification.raw import RawChannel, RawSession
+
+ORDER = 50
+#: Other devices' outliers beside spikes are taken for chance down to this probability.
+_CHANCE = 1e-3
+#: Of blows to the body, or a cable's snaps, other devices see this share; the rest fall between their
+#: samples.
+_BLOWS_SEEN = 0.9
+#: Nats for damaged samples against blows: one spike that nothing else sees has ln 10.
+_DOUBT = np.log(5.0)
+#: Places and angles cannot jump forth and back, whoever knocks.
+_KINEMATIC = ("mocap", "exciter_shaft")
+
+
+@dataclass(frozen=True)
+class _Witnessed:
+    """The spikes of one channel in one recording."""
+
+    seen: Flags  # (k,) whether another device has an outlier at the time of a spike
+    chance: float  # of that for any time
+    witnesses: bool  # whether there are other devices
+
+
+def find(session: RawSession) -> tuple[Found, ...]:
+    """Channels with spikes; the samples are left out."""
+    seen = {
+        (number, channel.topic): outliers(channel, start_ns(session.recordings[number]))
+        for _, recorded in channels_of(session)
+        for number, channel in recorded
+    }
+    spotted = []
+    for (_, name), recorded in channels_of(session):
+        watched = [(number, channel, seen[number, channel.topic]) for number, channel in recorded]
+        beside = {
+            number: [one for (n, topic), one in seen.items() if n == number and topic != channel.topic]
+            for number, channel, _ in watched
+        }
+        witnessed = [_witnessed(own, beside[number]) for number, _, own in watched]
+        if name not in _KINEMATIC and not _damaged(witnessed):
+            continue
+        for (number, channel, own), one in zip(watched, witnessed, strict=True):
+            spike = _unseen(own, one)
+            if spike.any():
+                spotted.append(_spotted(channel, number, spike, own))
+    found: list[Found] = []
+    for group in together(spotted):
+        session = corrected(session, group)
+        found.append(Found(_fault(session, group), session))
+    return tuple(found)
+
+
+def _spotted(channel: RawChannel, number: int, spike: Flags, seen: Outliers) -> Spotted:
+    gain = float(np.sum(0.5 * np.minimum(seen.off[spike], 1e3) ** 2 - np.log(len(spike))))
+    return Spotted(
+        channel.device, channel.channel, number, without(channel, spike), spans_of(spike, seen.time),
+        len(runs(spike)[0]), gain, float(np.count_nonzero(spike)),
+    )  # fmt: skip
+
+
+def _witnessed(own: Outliers, others: list[Outliers]) -> _Witnessed:
+    """Which spikes of a channel other devices see as well."""
+    starts, ends = runs(own.spike)
+    seen, covered = np.zeros(len(starts), bool), 0.0
+    middle = 0.5 * (own.time[starts] + own.time[ends - 1])
+    length = max(float(np.ptp(own.time)), 1e-9)
+    for other in others:
+        events = np.sort(other.time[other.off > OUTLIER])
+        if not len(events):
+            continue
+        reach = own.reach + other.reach
+        behind = np.clip(np.searchsorted(events, middle), 1, max(len(events) - 1, 1))
+        nearest = np.minimum(
+            np.abs(middle - events[np.minimum(behind, len(events) - 1)]), np.abs(middle - events[behind - 1])
+        )
+        seen |= nearest <= reach
+        covered += (float(np.sum(np.minimum(np.diff(events), 2.0 * reach))) + 2.0 * reach) / length
+    return _Witnessed(seen, min(covered, 1.0 - 1e-9), bool(others))
+
+
+def _damaged(witnessed: list[_Witnessed]) -> bool:
+    """Whether others see no more of the spikes than by chance; of the body's blows they see nearly all."""
+    gain = 0.0
+    for one in witnessed:
+        if one.witnesses and one.chance < _BLOWS_SEEN:
+            count, seen = len(one.seen), int(np.count_nonzero(one.seen))
+            gain += float(binom.logpmf(seen, count, one.chance) - binom.logpmf(seen, count, _BLOWS_SEEN))
+    return bool(gain > _DOUBT)
+
+
+def _unseen(own: Outliers, one: _Witnessed) -> Flags:
+    """(n,) the spikes without those that others see, where these are more than chance makes them."""
+    spike = np.array(own.spike)
+    if binom.sf(np.count_nonzero(one.seen) - 1, len(one.seen), one.chance) <= _CHANCE:
+        for a, b in [
+            pair for pair, seen in zip(zip(*runs(spike), strict=True), one.seen, strict=True) if seen
+        ]:
+            spike[a:b] = False
+    return np.asarray(spike)
+
+
+def _fault(session: RawSession, group: list[Spotted]) -> SetupFault:
+    names, count = devices_of(group), sum(one.count for one in group)
+    samples = int(sum(one.value for one in group))
+    verb = "has" if len(names) == 1 else "have"
+    noun = "spike" if count == 1 else "spikes"
+    what = f"{count} {noun} of one to three samples" if samples != count else f"{count} {noun} of one sample"
+    return SetupFault(
+        "spikes", where(session, group), {"count": {"value": count, "std": 0.0, "unit": "1"}},
+        f"{listed(names)} {verb} {what} in {of_recordings(session, group)} that no other device sees. "
+        f"{samples} samples are left out.",
+        "Look at shield, ground and plugs of the device's cable, and let the driver check what it receives.",
+        "", True, sum(one.gain for one in group),
+    )  # fmt: skip
