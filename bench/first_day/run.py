@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import signal
 import time
+import traceback
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -161,7 +162,11 @@ def _examined(raw: RawSession) -> tuple[Examined | None, dict[str, Any]]:
     except TimeoutError:
         return None, {"outcome": "too long", "seconds": float(LIMIT)}
     except Exception as err:  # a crash is a result of the bench, not its end
-        return None, {"outcome": "crash", "statement": f"{type(err).__name__}: {err}"}
+        place = traceback.extract_tb(err.__traceback__)[-1]
+        at = f"{Path(place.filename).name}:{place.lineno}"
+        own = [f for f in traceback.extract_tb(err.__traceback__) if "rig_identification" in f.filename]
+        via = " < ".join(f"{Path(f.filename).stem}.{f.name}" for f in own[:-4:-1])
+        return None, {"outcome": "crash", "statement": f"{type(err).__name__}: {err} ({at}; {via})"}
     return examined, {"seconds": time.process_time() - begin}
 
 

@@ -130,7 +130,7 @@ def _kind(entry: Entry) -> str:
 
 def _short(entry: Entry) -> str:
     if entry["outcome"] in ("crash", "refused"):
-        return f"{entry['outcome']}: {entry.get('statement', '')[:110]}"
+        return f"{entry['outcome']}: {entry.get('statement', '')[:220]}"
     said = ", ".join(entry.get("said", ())[:3])
     return f"{entry['outcome']}: {said}" if said else entry["outcome"]
 
