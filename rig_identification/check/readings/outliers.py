@@ -31,8 +31,9 @@ _FAR = 8.0
 OUTLIER = 6.0
 #: Samples on either side of a spike to which a cubic is fitted, and how many of them there must be.
 _BESIDE, _LEAST = 8, 10
-#: Std of what the cubic leaves: Student's t of 12 degrees of freedom is beyond this with 3e-7.
-_OVER_BESIDE = 10.0
+#: Std of what the cubic leaves: Student's t of 12 degrees of freedom is beyond this with 4e-6, of which the
+#: outliers that are looked at are one sample in ten thousand.
+_OVER_BESIDE = 8.0
 #: What rings on is right beside its first swing by more than noise and a tenth of it.
 _RINGS, _SWING = 4.5, 0.1
 #: A normal distribution's std over the median of its absolute values.
