@@ -258,6 +258,14 @@ def test_a_file_unpacked_beside_itself_is_read_once(written: Any, copied: Any, d
     assert said(read, "is no part of the bag, or a copy")
 
 
+def test_a_file_named_without_its_ending(copied: Any) -> None:
+    folder = copied()
+    shutil.move(bag_file(folder), folder / "other.mcap")
+    point_at(folder, "other")
+    with pytest.raises(InputError, match=r"other: bag does not exist; .*; did you mean other\.mcap\?"):
+        read_raw(folder)
+
+
 def test_big_endian_messages(written: Any, copied: Any) -> None:
     folder = copied()
     original = (folder / "dynamic_2").rename(folder / "original")

@@ -164,7 +164,10 @@ class ReplayNode(RigNode):
             self._told.publish(String(data=""))
             return
         entry = self._queue.pop(0)
-        self._played, self._sent = in_order(entry, read_bag(entry.folder, self._wanted)), 0
+        bag = read_bag(entry.folder, self._wanted)
+        for note in bag.notes:
+            self.get_logger().warning(f"{entry.name}: {note}")
+        self._played, self._sent = in_order(entry, bag), 0
         self._told.publish(String(data=entry.name))
         self._enter("pause")
 

@@ -47,10 +47,11 @@ def read_bag(path: Path, wanted: Collection[str]) -> Bag:
         Nothing there, a bag of which nothing can be read, or one topic with two types.
     """
     if not path.exists():
-        beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
+        beside = sorted(other.name for other in path.parent.iterdir()) if path.parent.is_dir() else []
+        same = [name for name in beside if name.startswith(f"{path.name}.")]  # the ending is missing
+        near = f"; did you mean {same[0]}?" if same else did_you_mean(path.name, beside)
         raise InputError(
-            f"{path}: bag does not exist; correct its path in session.yaml or copy it there"
-            f"{did_you_mean(path.name, beside)}"
+            f"{path}: bag does not exist; correct its path in session.yaml or copy it there{near}"
         )
     try:
         return _read(path, bag_files(path), wanted)

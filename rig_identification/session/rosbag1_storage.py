@@ -46,7 +46,7 @@ def collect_rosbag1(path: Path, contents: Contents) -> list[str]:
     elif not reading.indexed:
         notes.append("was not closed by its recorder: it was read from beginning to end")
     if reading.damage:
-        notes.append(f"is damaged: {len(reading.damage)} pieces of it are left out ({reading.damage[0]})")
+        notes.append(f"is damaged: parts of it left out: {len(reading.damage)} ({reading.damage[0]})")
     return notes
 
 
