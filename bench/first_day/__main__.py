@@ -14,6 +14,7 @@ import argparse
 import json
 import time
 import zlib
+from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
@@ -24,7 +25,7 @@ from bench.first_day.bases import bases
 from bench.first_day.faults import GROUPS, all_cases
 from bench.first_day.run import Task, done, fingerprint
 from bench.first_day.sessions import DEFAULT_CACHE, all_kept
-from bench.first_day.table import as_markdown, figures
+from bench.first_day.table import as_markdown, figures, kind_of
 
 HERE = Path(__file__).parent.parent
 
@@ -98,7 +99,8 @@ def _recorded_tasks(options: argparse.Namespace) -> list[Task]:
 def _run(tasks: Sequence[Task], log: Path, jobs: int, minutes: float) -> list[dict[str, Any]]:
     """Entries of the tasks in their order; what the log has is not done again.
 
-    Tasks are done in an order drawn by their names: what is done when the time is up is a fair sample.
+    One of each kind of fault comes first, then another of each: what is done when the time is up is a sample of
+    all kinds, drawn by the tasks' names.
     """
     code = fingerprint()
     known: dict[str, dict[str, Any]] = {}
@@ -106,7 +108,7 @@ def _run(tasks: Sequence[Task], log: Path, jobs: int, minutes: float) -> list[di
         lines = (json.loads(line) for line in log.read_text().splitlines())
         known = {e["key"]: e for e in lines if e["code"] == code}
     log.parent.mkdir(parents=True, exist_ok=True)
-    missing = sorted((t for t in tasks if t.key not in known), key=lambda t: zlib.crc32(t.key.encode()))
+    missing = [task for task in _in_turn(tasks) if task.key not in known]
     stop = time.monotonic() + 60.0 * minutes
     with log.open("a") as stream:
 
@@ -126,6 +128,20 @@ def _run(tasks: Sequence[Task], log: Path, jobs: int, minutes: float) -> list[di
                     if (entry := future.result()) is not None:
                         keep(entry)
     return [known[task.key] for task in tasks if task.key in known]
+
+
+def _in_turn(tasks: Sequence[Task]) -> list[Task]:
+    """Tasks in an order drawn by their names, one of each kind after the other."""
+    drawn = sorted(tasks, key=lambda task: zlib.crc32(task.key.encode()))
+    ranks: Counter[str] = Counter()
+    placed = []
+    for task in drawn:
+        kind = (
+            kind_of(task.case) if task.kind == "fault" else f"{task.kind} {zlib.crc32(task.key.encode()) % 8}"
+        )
+        placed.append((ranks[kind], task))
+        ranks[kind] += 1
+    return [task for _, task in sorted(placed, key=lambda place: place[0])]
 
 
 def _in_time(task: Task, stop: float) -> dict[str, Any] | None:

@@ -113,9 +113,9 @@ def _by_kind(entries: Sequence[Entry]) -> list[str]:
     """One line a kind of fault: the first two parts of the names."""
     lines = ["## By kind", "", "| kind | cases | named | else, as often |", "| --- | --- | --- | --- |"]
     faults = [e for e in entries if e["kind"] == "fault" and not e["untellable"]]
-    kinds = dict.fromkeys(_kind(e) for e in faults)
+    kinds = dict.fromkeys(kind_of(e["case"]) for e in faults)
     for kind in kinds:
-        own = [e for e in faults if _kind(e) == kind]
+        own = [e for e in faults if kind_of(e["case"]) == kind]
         named = sum(e["outcome"] == "named" for e in own)
         rest = Counter(_short(e) for e in own if e["outcome"] != "named")
         told = "; ".join(f"{what} ({n})" for what, n in rest.most_common(4))
@@ -123,8 +123,9 @@ def _by_kind(entries: Sequence[Entry]) -> list[str]:
     return lines
 
 
-def _kind(entry: Entry) -> str:
-    parts = entry["case"].split("/")
+def kind_of(case: str) -> str:
+    """Group and kind of a fault's name: the unit, or what comes next."""
+    parts = case.split("/")
     return "/".join([parts[0], parts[-1]] if parts[0] == "unit" else parts[:2])
 
 
