@@ -21,6 +21,7 @@ from scipy.linalg import eigh
 from scipy.stats import chi2
 
 from rig_identification.estimate.prediction import Linearised
+from rig_identification.model.definite import definite
 
 Array = NDArray[np.float64]
 
@@ -49,29 +50,14 @@ class Departure:
         return max(1.0, self.statistic / max(1, self.directions))
 
 
-#: Least information on a combination of parameters, in parts of what there is on each of them.
-LEAST = 1e-9
-
-
 def shared_information(information: Array, size: int) -> Array:
     """(size, size) information on the parameters with the start states integrated out.
 
     Where dry hinges stop a motion some of them leave no trace, and count as integrated out already.
     """
     cross, starts = information[:size, size:], information[size:, size:]
-    try:
-        lifted = np.linalg.solve(starts, cross.T)
-    except np.linalg.LinAlgError:
-        lifted = np.linalg.lstsq(starts, cross.T, rcond=LEAST)[0]
+    lifted = np.linalg.solve(definite(starts), cross.T)
     return np.asarray(information[:size, :size] - cross @ lifted)
-
-
-def _lifted(information: Array) -> Array:
-    """Information in which rounding has left no combination with less than none."""
-    scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    scaled = (vectors * np.maximum(values, LEAST)) @ vectors.T
-    return np.asarray(scaled * np.outer(scale, scale))
 
 
 def _directions(fitted: Array, full: Linearised) -> tuple[Array, Array, Array]:
@@ -80,11 +66,8 @@ def _directions(fitted: Array, full: Linearised) -> tuple[Array, Array, Array]:
     columns, starts = full.jacobian[:, :size], full.jacobian[:, size:]
     basis = np.linalg.qr(starts)[0]
     columns = columns - basis @ (basis.T @ columns)
-    try:
-        values, vectors = eigh(columns.T @ columns, fitted)
-    except np.linalg.LinAlgError:
-        # A fit that is nowhere near knows some combinations to more digits than there are
-        values, vectors = eigh(columns.T @ columns, _lifted(fitted))
+    # A fit that is nowhere near knows some combinations to more digits than there are
+    values, vectors = eigh(columns.T @ columns, definite(fitted))
     return values, vectors.T @ (columns.T @ full.residual), basis.T @ full.residual
 
 

@@ -23,6 +23,7 @@ from rig_identification.estimate.sampling import node_values
 from rig_identification.estimate.track import Track
 from rig_identification.model import layout
 from rig_identification.model.body import linear_from_log_cholesky, linear_in_log_cholesky
+from rig_identification.model.definite import definite
 from rig_identification.model.so3 import skew
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ def regress(balances: list[tuple[Array, Array]], theta: Array, weak: Array) -> t
         spread = spreads(miss)[kind]
         slope, miss = slope / spread[:, None], miss / spread
         normal = slope.T @ slope + np.diag(1.0 / weak**2)
-        change = np.linalg.solve(normal, slope.T @ miss - (theta - guess) / weak**2)
+        change = np.linalg.solve(definite(normal), slope.T @ miss - (theta - guess) / weak**2)
         theta = theta + change * min(1.0, 1.0 / float(np.max(np.abs(change))))
     left = spreads(right - rows @ linear_from_log_cholesky(theta))
     return theta, float(np.sum(np.log(left)))

@@ -435,10 +435,9 @@ class ParameterSet:
         """
         moved = theta + change
         line = self.elements(theta) + self.elements_jacobian(theta) @ change[:INERTIAL]
-        if can_exist(line):
-            straight = log_cholesky_from_linear(linear_from_elements(line))
-            if np.all(straight[_SPREADS] - theta[_SPREADS] > -np.log(THINNER)):
-                moved[:INERTIAL] = straight
+        straight = _body_of(line)
+        if straight is not None and np.all(straight[_SPREADS] - theta[_SPREADS] > -np.log(THINNER)):
+            moved[:INERTIAL] = straight
         return moved
 
     def elements_jacobian(self, theta: Array) -> Array:
@@ -448,6 +447,16 @@ class ParameterSet:
             return elements_from_linear(linear_from_log_cholesky(log_cholesky))
 
         return np.asarray(complex_step_jacobian(elements, theta[:INERTIAL]))
+
+
+def _body_of(elements: Array) -> Array | None:
+    """(10,) log-Cholesky vector of a body; None where there is none, or one thinner than digits can hold."""
+    if not can_exist(elements):
+        return None
+    try:
+        return log_cholesky_from_linear(linear_from_elements(elements))
+    except np.linalg.LinAlgError:
+        return None
 
 
 def parameter_set(rig: Rig, model: RigModel, channels: set[str]) -> ParameterSet:

@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 #: Unit of a start-state coordinate (m, rad, m/s, rad/s): keeps the vector's entries alike.
 START_UNIT = 0.01
+#: No whitened residual or derivative is larger, so that the squares of all of them are numbers.
+LARGEST = 1e120
 
 
 @dataclass(frozen=True)
@@ -312,6 +314,9 @@ def linearise_run(
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
         log_spread = float(np.sum(np.log(deviation)))
+    if columns.size and not max(float(np.max(columns)), -float(np.min(columns))) < LARGEST:
+        # Derivatives of motions that part from each other may grow beyond every number
+        return None
     whitened = columns[:, 1:]
     if start_only:
         whitened = np.zeros((plain.size, parameters.size + starts))

@@ -32,6 +32,7 @@ from rig_identification.estimate.rest_evidence import (
 )
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.model import layout
+from rig_identification.model.definite import definite
 from rig_identification.model.equilibrium import settle
 from rig_identification.model.motion import State, on_cables
 
@@ -80,6 +81,12 @@ class Evaluation:
     information: Array  # (p + starts, p + starts), data and priors
     prior_information: Array  # (p,) diagonal that priors alone contribute
     gradient: Array  # (p + starts,) of the negative cost
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether cost, information and gradient are numbers."""
+        parts = (self.cost, self.information, self.gradient)
+        return all(bool(np.all(np.isfinite(part))) for part in parts)
 
 
 def _prior(problem: Problem, theta: Array) -> tuple[float, Array, Array]:
@@ -140,7 +147,9 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
         if rest is None:
             return None
         rests.append(rest)
-    return _assemble(problem, point, tuple(r for r in runs if r is not None), tuple(rests))
+    found = _assemble(problem, point, tuple(r for r in runs if r is not None), tuple(rests))
+    # Derivatives of a motion that parts from its neighbours may grow beyond every number
+    return found if found.is_finite else None
 
 
 def _assemble(
@@ -221,7 +230,7 @@ def _step_within_bounds(
     """
     p = problem.bench.parameters.size
     open_, held = np.flatnonzero(~fixed), np.flatnonzero(fixed)
-    inside = information[np.ix_(open_, open_)]
+    inside = definite(information[np.ix_(open_, open_)])
     right = current.gradient[open_] - information[np.ix_(open_, held)] @ change[held]
     change = change.copy()
     change[open_] = np.linalg.solve(inside, right)
@@ -239,7 +248,7 @@ def _step_within_bounds(
     )
     box, middle = limit[open_][inner], here[open_][inner]
     step = in_box(
-        inside[np.ix_(inner, inner)] - across.T @ solved[:, :-1],
+        definite(inside[np.ix_(inner, inner)] - across.T @ solved[:, :-1]),
         right[inner] - across.T @ solved[:, -1],
         -box - middle,
         box - middle,
@@ -322,11 +331,7 @@ def as_good_as_settled(problem: Problem, current: Evaluation, close: float = CLO
     The residuals' spreads depend on the parameters as well, and that slope is not in the Jacobian: at
     the best point it and the residuals' own balance, and a full step promises a little for ever.
     """
-    try:
-        return still_promised(problem, current) < close and not on_plateau(current)
-    except np.linalg.LinAlgError:
-        # Nowhere near: some combinations are known to more digits than there are
-        return False
+    return still_promised(problem, current) < close and not on_plateau(current)
 
 
 def still_promised(problem: Problem, current: Evaluation) -> float:

@@ -96,11 +96,9 @@ def fit_start(
     current = attempt(start)
     if current is None:
         return None
-    damping, moved_so_far = 1e-9, np.zeros(current.jacobian.shape[1] - p)
     inner = model.states - layout.BODY_STATE
-    dof = (moved_so_far.size - inner) // 2
-    allowed = [1.0] * dof + [2.0] * dof + [INNER] * (inner // 2) + [INNER * INNER_RATE] * (inner // 2)
-    weight = (START_UNIT / (spread * np.array(allowed))) ** 2
+    damping, moved_so_far = 1e-9, np.zeros(current.jacobian.shape[1] - p)
+    weight = _weight(moved_so_far.size, inner, spread)
     doubts = Doubts(p, doubted)
     for _ in range(iterations):
         information, gradient = doubts.eliminated(current)
@@ -114,10 +112,14 @@ def fit_start(
         trial = attempt(moved)
         further = moved_so_far + change
         prior_change = 0.5 * float(weight @ (further**2 - moved_so_far**2))
+        if trial is not None and trial.jacobian.shape[1] - p != further.size:
+            # Cables of which more than needed hold the body leave it other freedoms there: none is known of
+            further, prior_change = np.zeros(trial.jacobian.shape[1] - p), 0.0
         cost = doubts.cost(current)
         if trial is not None and doubts.cost(trial) + prior_change < cost + 1e-9 * abs(cost):
             won = cost - doubts.cost(trial)
             current, start, moved_so_far, damping = trial, moved, further, max(damping * 0.1, 1e-12)
+            weight = _weight(moved_so_far.size, inner, spread)
             left = 0.5 * float(current.residual @ current.residual - current.residual.size)
             if max(won, tolerance) < polish * left:
                 break
@@ -126,3 +128,10 @@ def fit_start(
             if damping > 1e6:
                 break
     return current, start
+
+
+def _weight(size: int, inner: int, spread: float) -> Array:
+    """(size,) prior information on a start, the ``inner`` last of it what swings or yields within the rig."""
+    dof = (size - inner) // 2
+    allowed = [1.0] * dof + [2.0] * dof + [INNER] * (inner // 2) + [INNER * INNER_RATE] * (inner // 2)
+    return np.asarray((START_UNIT / (spread * np.array(allowed, dtype=float))) ** 2)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from rig_identification.estimate.solve import Evaluation
+from rig_identification.model.definite import definite
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class Beyond:
         self.full, self.base, self.size = full, base, size
         self._scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[base], 1e-300))
         inside = full.information[np.ix_(base, base)] * np.outer(self._scale, self._scale)
-        self._factor = cho_factor(inside + 1e-12 * np.eye(base.size))
+        self._factor = cho_factor(definite(inside + 1e-12 * np.eye(base.size)))
 
     def of(self, runs: Sequence[Array | None], rests: Sequence[Array] = ()) -> Columns:
         """Columns (m, c) of every run, None where they do not show, and of every rest pose where they do."""

@@ -17,6 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 from rig_identification.estimate.box import in_box
 from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.solve import Evaluation, Problem, limit_of
+from rig_identification.model.definite import definite
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ class Boxed:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[out], 1e-300))
         inside = full.information[np.ix_(out, out)] * np.outer(scale, scale)
         across = scale[:, None] * full.information[np.ix_(out, kept)]
-        solved = cho_solve(cho_factor(inside + 1e-12 * np.eye(out.size)), across)
+        solved = cho_solve(cho_factor(definite(inside + 1e-12 * np.eye(out.size))), across)
         self._matrix = full.information[np.ix_(kept, kept)] - across.T @ solved
         self._right = full.gradient[kept] - solved.T @ (scale * full.gradient[out])
         self._here = full.point.theta[kept]
@@ -95,6 +96,7 @@ class Boxed:
         inside = matrix[np.ix_(at, at)]
         scale = 1.0 / np.sqrt(np.maximum(np.diag(inside), 1e-300))
         inside = inside * np.outer(scale, scale) + 1e-12 * np.eye(at.size)
+        inside = definite(inside)
         x = in_box(inside, scale * right[at], low / scale, high / scale)
         step = np.zeros(right.size)
         step[at] = scale * x

@@ -27,6 +27,7 @@ from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.model.definite import definite
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import State
 
@@ -101,8 +102,8 @@ def log_evidence(evaluation: Evaluation) -> float:
     Start states have flat priors and count alike in every hypothesis; their share cancels
     but for its correlation, which the determinant keeps.
     """
-    sign, log_det = np.linalg.slogdet(evaluation.information)
-    return -evaluation.cost - 0.5 * float(log_det) if sign > 0 else -np.inf
+    _, log_det = np.linalg.slogdet(definite(evaluation.information))
+    return -evaluation.cost - 0.5 * float(log_det)
 
 
 def earned_evidence(problem: Problem, before: Evaluation, after: Evaluation, *, far: bool) -> float:
