@@ -95,7 +95,7 @@ class Identification:
     parameters: tuple[ParameterEstimate, ...]
     channels: tuple[ChannelFit, ...]  # training, statics and holdout alike
     holdout_error: float | None  # contract: rms of held-out prediction errors in units of noise
-    training_error: float
+    training_error: float | None  # of the fitted runs, of rest where there is no run; None: nothing fitted
     converged: bool
     notes: tuple[str, ...] = ()  # sentences for the report: warnings, what was left aside
     figures: dict[str, object] = field(default_factory=dict)  # numbers behind further pictures

@@ -23,11 +23,11 @@ from rig_identification.mismatch.places import crossed, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.rider_places import travel_along
 from rig_identification.mismatch.riders import DAMPING, FREQUENCIES
+from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.supports import (
     cable_elasticity,
     ceiling_candidate,
     largest_compliance,
-    usual_stiffness,
 )
 from rig_identification.model import layout
 from rig_identification.model.effects import place

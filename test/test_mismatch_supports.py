@@ -19,7 +19,8 @@ from rig_identification.mismatch.first_fits import begun
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.riders import Swing, rider_candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
-from rig_identification.mismatch.supports import cable_elasticity, usual_stiffness
+from rig_identification.estimate.stretching import usual_stiffness
+from rig_identification.mismatch.supports import cable_elasticity
 from rig_identification.mismatch.trial import Trial, attempt, mass_of, promised
 from rig_identification.recording import Series, Session
 from rig_identification.simulate import simulate_session

@@ -112,6 +112,7 @@ class Run:
     R_tracker_mean: Array | None = None  # (3, 3) see sensors.mocap
     offset: float = 0.0  # s after the recording's start at which node 0 lies
     unknown: tuple[tuple[float, float], ...] = ()  # stretches (s) whose force is not known (force_gaps.py)
+    out_of: float = 0.0  # s of the run of which this is the liveliest stretch (enough.py); 0: it is not cut
 
     @cached_property
     def samplers(self) -> tuple[Sampler, ...]:
@@ -122,6 +123,11 @@ class Run:
     def begins(self) -> tuple[str, float]:
         """Where it begins: its recording, and s into that. A run and its first piece begin alike."""
         return self.recording.name, self.offset
+
+    @property
+    def watched(self) -> bool:
+        """Whether motion capture sees the body in it."""
+        return any(c.device == "mocap" for c in self.channels)
 
     def until(self, end: float) -> Run:
         """The same run, cut off at ``end`` seconds."""
@@ -145,7 +151,8 @@ class Run:
         # The input is cut, not made anew: at an edge a spline knows half as much
         force = None if self.force is None else self.force.between(first, last)
         offset = self.offset + shift
-        return replace(self, grid=grid, channels=tuple(cut), force=force, offset=offset, unknown=())
+        cut_off = replace(self, grid=grid, channels=tuple(cut), force=force, offset=offset, unknown=())
+        return cut_off if cut_off.watched else replace(cut_off, R_tracker_mean=None)
 
     def where_driven(self) -> tuple[Run, ...]:
         """The run's parts between stretches in which its force is not known, from its first reading on."""
@@ -307,6 +314,8 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
             force = smooth_force(grid, exciter.time, exciter.values, std) or force
     channels = tuple(c for c in found if c is not None)
     run = Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
+    if not run.watched:
+        run = replace(run, R_tracker_mean=None)
     if force is None or force.cutoff > 0.0:
         return run
     felt = noise_felt(grid, known.time, run.samplers)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.estimate.stretching import Stretched
 from rig_identification.model.motion import State
 
 
@@ -33,3 +34,5 @@ class Fitted:
     guess: Point | None = None  # where the fit started: everything about the rig as described
     held_parts: tuple[HeldPart, ...] = ()
     lost: tuple[Run, ...] = ()  # held-out runs that cannot be followed from any start state
+    unfollowed: tuple[str, ...] = ()  # recordings that the model could not follow when the fit began
+    stretch: Stretched | None = None  # where the cables of the ideal model stretch from the first guess on

@@ -22,6 +22,7 @@ from rig_identification.estimate.solve import (
     Evaluation,
     Point,
     Problem,
+    evaluate,
     shortened,
     solve,
 )
@@ -42,6 +43,14 @@ HOPELESS_SQUARE = 2.0
 NEAR_SQUARE = 1.3
 #: Steps of the whole run's fit; fewer where a shorter horizon was hopeless: they only say how far off it is.
 STEPS, HOPELESS_STEPS = 20, 5
+
+
+class OutOfReach(FloatingPointError):
+    """A horizon beyond one that was fitted cannot be followed from where that fit ended."""
+
+    def __init__(self, end: float, point: Point) -> None:
+        super().__init__(f"the motion leaves every bound after the first {end:g} s")
+        self.end, self.point = end, point
 
 
 def misfit(evaluation: Evaluation) -> float:
@@ -79,7 +88,10 @@ def _at(notify: Callable[[float, str], None], end: float, duration: float) -> Ca
 def solve_growing(
     problem: Problem, point: Point, notify: Callable[[float, str], None] | None = None
 ) -> tuple[Evaluation, bool]:
-    """Fit over growing horizons; (evaluation over everything, whether the last one converged)."""
+    """Fit over growing horizons; (evaluation over everything, whether the last one converged).
+
+    Raises OutOfReach where a horizon after the first cannot be followed.
+    """
     duration = max((run.grid.duration for run in problem.runs), default=0.0)
     ends = horizons(duration) if problem.runs else [0.0]
     guess = point.theta[:INERTIAL].copy()
@@ -92,6 +104,8 @@ def solve_growing(
             part = held_over(problem, end, guess)
         # The start states alone first: their error is the largest, and everything else would bend to it
         point = replace(point, starts=settled_starts(part, point))
+        if i and evaluate(part, point, residuals_only=True) is None:
+            raise OutOfReach(ends[i - 1], point)
         # A short horizon needs no polish: the next one moves everything again
         evaluation, converged = solve(
             part,

@@ -11,16 +11,24 @@ from numpy.typing import NDArray
 from rig_identification.errors import InputError
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits
+from rig_identification.estimate.enough import enough, told
 from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
-from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, weak_prior
+from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, rest_of, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
-from rig_identification.estimate.growing import HOPELESS_SQUARE, NEAR_SQUARE, misfit, solve_growing
+from rig_identification.estimate.followable import CannotBeFollowed, followable, hanging
+from rig_identification.estimate.growing import (
+    HOPELESS_SQUARE,
+    NEAR_SQUARE,
+    OutOfReach,
+    misfit,
+    solve_growing,
+)
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, unsettled
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
-from rig_identification.estimate.prediction import Bench
+from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.rods import note_of, rods_of, with_rods
 from rig_identification.estimate.rolling import ways_of_rolling
@@ -32,7 +40,16 @@ from rig_identification.estimate.segments import (
     solve_in_pieces,
     with_noise_of_swing,
 )
-from rig_identification.estimate.solve import Evaluation, Point, Problem, as_good_as_settled, evaluate, solve
+from rig_identification.estimate.solve import (
+    Evaluation,
+    Point,
+    Problem,
+    as_good_as_settled,
+    evaluate,
+    shortened,
+    solve,
+)
+from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -40,12 +57,13 @@ from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.model.sensors import MocapMount
-from rig_identification.recording import Session
+from rig_identification.recording import Recording, Session
 from rig_identification.result import (
     ChannelFit,
     Identification,
     Mismatch,
 )
+from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -71,17 +89,16 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     elements = elements_that_hang(session)
     model = rig_model(rig, elements)
     model = model if assumed is None else assumed(model)
-    runs = tuple(away_from_jumps(part) for r in session.training for part in prepare(rig, r).where_driven())
-    held = tuple(away_from_jumps(part) for r in session.holdouts for part in prepare(rig, r).where_driven())
-    rests = tuple(prepare_rest(rig, recording) for recording in session.statics)
+    runs, held = _runs_of(rig, session.training), _runs_of(rig, session.holdouts)
+    rests = tuple(r for r in (prepare_rest(rig, recording) for recording in session.statics) if r.channels)
+    if not (runs or rests):
+        _refuse(session, held)
     model = with_rods(model, rig, rods_of(rig, (*runs, *held)))
+    if not any(run.watched for run in runs):
+        # How the tracker stands in the room is fitted, and to no held-out run
+        held = tuple(run for run in map(without_mocap, held) if run.channels)
     channels = {c.device for run in (*runs, *held) for c in run.channels}
     channels |= {c.device for evidence in rests for c in evidence.channels}
-    if not channels:
-        raise InputError(
-            f"{session.name}: no recording holds a cable's tension, an IMU, an inclinometer or motion "
-            "capture that the rig description mounts; record or describe at least one of them"
-        )
     parameters = parameter_set(rig, model, channels)
     theta = parameters.start(elements)
     mass = (
@@ -95,6 +112,27 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     return problem, theta, held
 
 
+def _runs_of(rig: Rig, recordings: tuple[Recording, ...]) -> tuple[Run, ...]:
+    """Runs in which a device that the description mounts was heard, in parts where a force is not known."""
+    parts = (away_from_jumps(part) for r in recordings for part in prepare(rig, r).where_driven())
+    return enough(tuple(part for part in parts if part.channels))
+
+
+def _refuse(session: Session, held: tuple[Run, ...]) -> None:
+    """Say why a session holds nothing that a fit may use."""
+    if held:
+        names = ", ".join(dict.fromkeys(run.recording.name for run in held))
+        raise InputError(
+            f"{session.name}: every run is held out ({names}) and no static recording holds a device that "
+            "the rig description mounts: nothing is left to fit to; take holdout: true from a run in "
+            "session.yaml"
+        )
+    raise InputError(
+        f"{session.name}: no recording holds a cable's tension, an IMU, an inclinometer or motion "
+        "capture that the rig description mounts; record or describe at least one of them"
+    )
+
+
 @dataclass(frozen=True)
 class Start:
     """Where the fit of a session starts, and the free parts of its runs."""
@@ -105,6 +143,8 @@ class Start:
     held: tuple[Run, ...]
     notes: tuple[str, ...] = ()
     held_parts: tuple[HeldPart, ...] = ()
+    unfollowed: tuple[str, ...] = ()  # recordings that the model cannot follow from there
+    stretch: Stretched | None = None  # where its cables stretch from the first guess on
 
 
 def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
@@ -114,7 +154,7 @@ def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progr
     if launch.rest is None:
         raise AssertionError("from_rest finds a pose")
     progress("first guess from momentum", 0.05)
-    watched = next((run for run in problem.runs if run.R_tracker_mean is not None), None)
+    watched = next((run for run in problem.runs if run.watched), None)
     if watched is None:
         return Start(problem, launch.from_momentum().point(), launch.rest, held)
     if problem.bench.rig.mocap is not None:
@@ -135,32 +175,38 @@ def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progr
 def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) -> Start | None:
     """From a scan, then from the free parts of the runs: sessions that only watch a body swing."""
     progress("scanning inertia and depth", 0.05)
-    found = scan(problem, problem.runs[0])
+    found = scan(problem, next((run for run in problem.runs if run.watched), problem.runs[0]))
     if found is None:
         return None
     problem = replace(found.problem, runs=problem.runs)
     progress("looking for the free part of each run", 0.2)
     half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
     theta = _rolling(half, found)
-    parts = {run.recording.name: free_part(problem, run, theta, found.rest) for run in (*problem.runs, *held)}
-    free = {name: with_noise_of_swing(part.run) for name, part in parts.items()}
-    by_hand = tuple(stretch for name, part in parts.items() for stretch in _stretches(name, part))
-    notes = tuple(_note(name, part) for name, part in parts.items() if part.held)
-    runs = tuple(free[run.recording.name] for run in problem.runs)
+    parts = [(r.recording.name, free_part(problem, r, theta, found.rest)) for r in (*problem.runs, *held)]
+    free = tuple(with_noise_of_swing(part.run) for _, part in parts)
+    by_hand = tuple(stretch for name, part in parts for stretch in _stretches(name, part))
+    notes = tuple(_note(name, part) for name, part in parts if part.held)
+    runs, held = free[: len(problem.runs)], free[len(problem.runs) :]
     problem = replace(problem, runs=runs)
     starts = launch_states(problem.bench, runs, theta, found.rest)
     point = Point(theta, starts, (found.rest,) * len(problem.rests))
-    held = tuple(free[run.recording.name] for run in held)
     return Start(problem, point, found.rest, held, notes, by_hand)
 
 
 def _rolling(half: Problem, found: Scanned) -> Array:
     """The scan's vector fitted to short pieces, with the body rolling as it fits them best (rolling.py)."""
     guesses = (found.rest,) * len(half.rests)
-    parts, best, _ = solve_in_pieces(half, found.theta, found.rest, guesses)
+    try:
+        parts, best, _ = solve_in_pieces(half, found.theta, found.rest, guesses)
+    except CannotBeFollowed:
+        return found.theta
     for theta in ways_of_rolling(parts, parts.runs, best.point.theta, found.rest):
-        _, other, _ = solve_in_pieces(half, theta, found.rest, guesses)
-        best = other if other.cost < best.cost else best
+        try:
+            _, other, _ = solve_in_pieces(half, theta, found.rest, guesses)
+        except CannotBeFollowed:
+            continue
+        if len(other.runs) == len(best.runs) and other.cost < best.cost:
+            best = other
     return best.point.theta
 
 
@@ -199,11 +245,40 @@ def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Pr
     return _measured_start(problem, theta, held, progress)
 
 
+def _begun(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
+    """Where the fit of a session starts, with what its model can follow from there.
+
+    Raises CannotBeFollowed where that is nothing.
+    """
+    soft = where_they_stretch(problem, theta)
+    if soft is None:
+        try:
+            return _followed(problem, theta, held, progress)
+        except CannotBeFollowed:
+            # No pose keeps the length of every cable: those that stretch always hang somewhere
+            soft = with_stretch(problem, theta)
+            if soft is None:
+                raise
+    start = _followed(soft.problem, soft.theta, held, progress)
+    return replace(start, stretch=soft)
+
+
+def _followed(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
+    """Where the fit starts, with what its model can follow. Raises CannotBeFollowed where that is nothing."""
+    rest = rest_of(model_at(problem.bench.parameters, theta))
+    still, lost = hanging(problem, theta, rest)
+    start = start_of(still, theta, held, progress)
+    moving = followable(start.problem, start.point, start.rest)
+    names = tuple(dict.fromkeys((*lost, *moving.names)))
+    return replace(start, problem=moving.problem, point=moving.point, unfollowed=names)
+
+
 def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed | None = None) -> Fitted:
     """Fit the ideal model to a session and predict its held-out runs."""
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
-    fitted = fit_from(start_of(problem, theta, held, progress), progress)
+    fitted = fit_from(_begun(problem, theta, held, progress), progress)
+    fitted = replace(fitted, notes=(*told((*problem.runs, *held)), *fitted.notes))
     rods = rods_of(session.rig, (*problem.runs, *held))
     fitted = replace(fitted, notes=(*fitted.notes, note_of(rods))) if rods else fitted
     less = without_unseen_force(session, fitted, _surely_driven)
@@ -211,7 +286,7 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
         return fitted
     progress("without the runs whose force was not measured", 0.6)
     problem, theta, held = pose_problem(less.session, assumed)
-    again = fit_from(start_of(problem, theta, held, progress), progress)
+    again = fit_from(_begun(problem, theta, held, progress), progress)
     return replace(again, notes=(*again.notes, less.note))
 
 
@@ -274,13 +349,31 @@ FOLLOWED = 80
 LEFT = 2.0
 
 
+#: What is told where a motion cannot be followed to its end.
+CUT_SHORT = (
+    "Of each run the first {end:g} s are used: beyond, the motion of the model as fitted has no bound."
+)
+
+
+def _grown(start: Start, progress: Progress) -> tuple[Start, Evaluation, bool]:
+    """The fit over growing horizons, as far as its runs can be followed: what was fitted, it, converged."""
+
+    def notify(fraction: float, text: str) -> None:
+        progress(f"fit: {text}", 0.15 + 0.45 * fraction)
+
+    try:
+        return (start, *solve_growing(start.problem, start.point, notify))
+    except OutOfReach as reached:
+        short = shortened(start.problem, reached.end)
+        names = tuple(dict.fromkeys((*start.unfollowed, *(run.recording.name for run in short.runs))))
+        notes = (*start.notes, CUT_SHORT.format(end=reached.end))
+        start = replace(start, problem=short, notes=notes, unfollowed=names)
+        return (start, *solve(short, reached.point))
+
+
 def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
     """Fit the ideal model from where a session's fit starts, and predict the held-out runs."""
-    evaluation, converged = solve_growing(
-        start.problem,
-        start.point,
-        notify=lambda fraction, text: progress(f"fit: {text}", 0.15 + 0.45 * fraction),
-    )
+    start, evaluation, converged = _grown(start, progress)
     if only_watched(start.problem) and misfit(evaluation) < NEAR_SQUARE:
         # The valleys of a body that is only watched are curved: what a step wins says little of what is left
         evaluation, converged = solve(start.problem, evaluation.point, iterations=FOLLOWED, tolerance=1e-3)
@@ -298,6 +391,8 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         start.point,
         start.held_parts,
         lost,
+        start.unfollowed,
+        start.stretch,
     )
 
 
@@ -316,13 +411,14 @@ def scores(fitted: Fitted) -> Scores:
     fits = []
     for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
         fits += run_fits(problem, run, linearised, evaluation.point.theta)
-    training = error_in_sigma(fits)
+    still = []
     for evidence, rest in zip(problem.rests, evaluation.rests, strict=True):
-        fits += rest_fits(evidence, rest)
+        still += rest_fits(evidence, rest)
+    training = error_in_sigma(fits or still)
     held = []
     for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
         held += run_fits(problem, run, linearised, evaluation.point.theta)
-    return Scores(tuple(fits + held), training, error_in_sigma(held) if held else None)
+    return Scores((*fits, *still, *held), training, error_in_sigma(held) if held else None)
 
 
 @dataclass(frozen=True)
@@ -364,10 +460,18 @@ def near_noise(fitted: Fitted) -> bool:
 
 def with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
     """The same with a cautious fit of short pieces, where the ideal model does not explain the session."""
-    fitted, found, mismatch = ideal.fitted, ideal.scores, ideal.mismatch
-    if mismatch.verdict == "none" or not fitted.problem.runs or ideal.careful is not None:
+    if ideal.mismatch.verdict == "none" or not ideal.fitted.problem.runs or ideal.careful is not None:
         return ideal
     notify("fitting short pieces, each channel weighed by its residual", 0.7)
+    try:
+        return _with_pieces(ideal, notify)
+    except CannotBeFollowed:
+        # Not even a piece: the fit stands as it is
+        return ideal
+
+
+def _with_pieces(ideal: Ideal, notify: Progress) -> Ideal:
+    fitted, found, mismatch = ideal.fitted, ideal.scores, ideal.mismatch
     points = [fitted.evaluation.point]
     if fitted.guess is not None and misfit(fitted.evaluation) > HOPELESS_SQUARE:
         # A model that lacks much bends everything to swallow it: start again from where nothing is bent
@@ -407,7 +511,16 @@ def fitted_again(ideal: Ideal, runs: tuple[Run, ...], held: tuple[Run, ...], not
     problem = replace(fitted.problem, runs=runs)
     point = fitted.guess or fitted.evaluation.point
     starts = launch_states(problem.bench, runs, point.theta, fitted.rest)
-    start = Start(problem, replace(point, starts=starts), fitted.rest, held, fitted.notes, fitted.held_parts)
+    start = Start(
+        problem,
+        replace(point, starts=starts),
+        fitted.rest,
+        held,
+        fitted.notes,
+        fitted.held_parts,
+        fitted.unfollowed,
+        fitted.stretch,
+    )
     return fit_from(start, notify)
 
 
@@ -473,8 +586,6 @@ def identify(session: Session, progress: Progress | None = None) -> Identificati
 
 
 def error_in_sigma(fits) -> float:  # type: ignore[no-untyped-def]
-    """Root mean square of all residuals, each in units of its sensor's noise."""
-    if not fits:
-        return float("nan")
+    """Root mean square of all residuals, each in units of its sensor's noise. fits: at least one."""
     total = sum(float(np.sum(fit.residual_in_sigma**2)) for fit in fits)
     return float(np.sqrt(total / sum(fit.time.size for fit in fits)))

@@ -18,8 +18,8 @@ from rig_identification.estimate.solve import HOPELESS, Evaluation, Point, Probl
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.track import Track, start_covariance, track, wrench_noise
 from rig_identification.model import layout, sensors
-from rig_identification.model.equilibrium import settle
-from rig_identification.model.motion import Input, State, on_cables, simulate
+from rig_identification.model.equilibrium import find_rest, settle
+from rig_identification.model.motion import Input, State, on_cables, redundant, simulate
 
 Array = NDArray[np.float64]
 
@@ -130,7 +130,12 @@ def launch_state(
     be off, in tolerances (fit_start). Cables that stretch begin stretched as far as rigid ones pull: from
     elsewhere the body bounces, and a millimetre is a tonne.
     """
-    if np.any(bench.parameters.model.modes == layout.ELASTIC):
+    soft = bench.parameters.model.modes != layout.RIGID
+    if np.any(soft) and redundant(bench.rig):
+        # Of rigid cables no motion keeps them all: from where those that stretch let the body hang
+        hung = find_rest(model_at(bench.parameters, theta), rest)
+        rest = hung.state if hung.converged else rest
+    elif np.any(bench.parameters.model.modes == layout.ELASTIC):
         rigid = _rigid(bench)
         near = launch_state(
             rigid, run, theta, on_cables(model_at(rigid.parameters, theta), rest), noise, doubted

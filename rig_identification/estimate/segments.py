@@ -16,8 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.followable import CannotBeFollowed
 from rig_identification.estimate.launch import launch_state, launch_states
+from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.sampling import LOCAL, sample_noise_std
+from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
@@ -39,10 +42,23 @@ def pieces_of(run: Run, length: float = PIECE) -> tuple[Run, ...]:
 def in_pieces(
     problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...], length: float = PIECE
 ) -> tuple[Problem, Point]:
-    """The same problem with every run in pieces, and a point with a start state for each."""
-    cut = tuple(piece for run in problem.runs for piece in pieces_of(run, length))
+    """The same problem with every run in pieces, and a point with a start state for each.
+
+    Pieces that the model cannot follow at ``theta`` are left out. Raises CannotBeFollowed where none is left.
+    """
+    cut = tuple(piece for run in problem.runs for piece in pieces_of(run, length) if piece.channels)
     starts = launch_states(problem.bench, cut, theta, rest)
-    return replace(problem, runs=cut), Point(theta, starts, rest_guesses)
+
+    def follows(begun: tuple[Run, State]) -> bool:
+        piece, start = begun
+        return linearise_run(problem.bench, piece, theta, start, start_only=True) is not None
+
+    followed = side_by_side(follows, zip(cut, starts, strict=True))
+    kept = [begun for begun, good in zip(zip(cut, starts, strict=True), followed, strict=True) if good]
+    if not kept:
+        raise CannotBeFollowed(problem, theta, tuple(dict.fromkeys(run.recording.name for run in cut)))
+    parts = replace(problem, runs=tuple(run for run, _ in kept))
+    return parts, Point(theta, tuple(start for _, start in kept), rest_guesses)
 
 
 def solve_in_pieces(

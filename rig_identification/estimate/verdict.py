@@ -20,6 +20,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, linearise_run
 from rig_identification.estimate.whiteness import Band, bands
+from rig_identification.model.definite import definite
 from rig_identification.result import Mismatch, ParameterEstimate
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
         inside, pull = information[np.ix_(free, free)].copy(), gradient[free].copy()
         inside[at, at] -= 1.0 - LET_GO**-2
         pull[at] += theta[i] * (1.0 - LET_GO**-2)
-        step = np.linalg.solve(inside, pull)
+        step = np.linalg.solve(definite(inside), pull)
         gain = 0.5 * float(step @ pull)
         if gain > limit and abs(theta[i] + step[at]) > ordinary:
             out.add(parameters.free[i - INERTIAL].name)
@@ -230,6 +231,10 @@ def judge(
     reasons += [
         f"{run.recording.name}, held out, cannot be followed with these parameters from any start"
         for run in fitted.lost
+    ]
+    reasons += [
+        f"{name} cannot be followed with the rig as described: it is left out of the fit"
+        for name in fitted.unfollowed
     ]
     reasons += _restless(fitted, heard.tests + len(fitted.problem.rests))
     if not fitted.converged:

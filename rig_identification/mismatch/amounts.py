@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit, settled_starts
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, shortened
+from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.riders import Swing, rider_candidate
@@ -25,7 +26,6 @@ from rig_identification.mismatch.supports import (
     ceiling_candidate,
     gives_way,
     largest_compliance,
-    usual_stiffness,
 )
 from rig_identification.mismatch.trial import HORIZONS, Trial, promised
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.followable import CannotBeFollowed
 from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit
 from rig_identification.estimate.identify import (
     Assumed,
@@ -23,12 +24,14 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
+from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.without_frame import subtract_frame
-from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.budget import SECONDS, Budget
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
+from rig_identification.mismatch.stretched_at_first import with_stretch_told
 from rig_identification.mismatch.watched import Watched, explain_watched
 from rig_identification.recording import Session
 from rig_identification.result import Identification
@@ -40,11 +43,15 @@ IDEAL_SHARE = 0.4
 
 
 def identify(
-    session: Session, progress: Progress | None = None, assumed: Assumed | None = None
+    session: Session,
+    progress: Progress | None = None,
+    assumed: Assumed | None = None,
+    seconds: float = SECONDS,
 ) -> Identification:
     """Mass, centre of mass and inertia tensor, with whatever the ideal model leaves out found and modelled.
 
-    assumed: what another ideal model than this project's assumes, the thesis' for one.
+    assumed: what another ideal model than this project's assumes, the thesis' for one. seconds: after which
+    the search for what is left out begins nothing new (budget.py).
     ``figures["ideal"]`` of the result holds the ideal model's own answer where effects were found.
 
     Raises InputError where the session holds nothing to fit.
@@ -58,7 +65,17 @@ def identify(
     session = session if origins.given else moved(session, origins)
     lines = lines_at_rest(session)
     session = without_lines(session, lines)
-    found, ideal = _identified(session, notify, assumed)
+    try:
+        found = _driven(session, notify, assumed, seconds)
+    except CannotBeFollowed as why:
+        found = unanswered(session, why)
+    found = replace(found, mismatch=with_lines(with_overranges(found.mismatch, session), lines))
+    return found if origins.given else told(found, origins)
+
+
+def _driven(session: Session, notify: Progress, assumed: Assumed | None, seconds: float) -> Identification:
+    """The answer to a session, without the runs that a force drives which was not recorded."""
+    found, ideal = _identified(session, notify, assumed, seconds)
     less = None
     if found.mismatch.verdict == "unexplained" and all(
         f.effect == "unknown" for f in found.mismatch.findings
@@ -66,10 +83,9 @@ def identify(
         # An exciter whose topic is missing may have been off: only where nothing else is found was it not
         less = without_unseen_force(session, ideal, lambda run: True)
     if less is not None:
-        rest, _ = _identified(less.session, notify, assumed)
+        rest, _ = _identified(less.session, notify, assumed, seconds)
         found = _without_unseen(found, rest, less.note)
-    found = replace(found, mismatch=with_lines(with_overranges(found.mismatch, session), lines))
-    return found if origins.given else told(found, origins)
+    return with_stretch_told(found, ideal)
 
 
 def _without_unseen(found: Identification, rest: Identification, note: str) -> Identification:
@@ -104,7 +120,9 @@ def _worth_a_search(watched: Watched) -> bool:
     return watched.mismatch.verdict == "unexplained" and misfit(watched.fitted.evaluation) < HOPELESS_SQUARE
 
 
-def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> tuple[Identification, Fitted]:
+def _identified(
+    session: Session, notify: Progress, assumed: Assumed | None, seconds: float
+) -> tuple[Identification, Fitted]:
     """The answer to a session, and the ideal model's fit."""
 
     def searching(stage: str, fraction: float) -> None:
@@ -113,7 +131,7 @@ def _identified(session: Session, notify: Progress, assumed: Assumed | None) -> 
     def fitting(stage: str, fraction: float) -> None:
         notify(stage, IDEAL_SHARE * fraction)
 
-    budget = Budget()
+    budget = Budget(seconds)
     fitted = fit_session(session, fitting, assumed)
     ideal = Ideal(fitted, *judged(fitted))
     spells = spells_of(fitted)

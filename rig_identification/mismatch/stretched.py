@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, excess, shortened
+from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.measured import driven
 from rig_identification.mismatch.screen import Promise, carried, extended
-from rig_identification.mismatch.supports import cable_elasticity, gives_way, usual_stiffness
+from rig_identification.mismatch.supports import cable_elasticity, gives_way
 from rig_identification.mismatch.trial import VERY_FAR, promised
 from rig_identification.mismatch.unbent import at_first
 

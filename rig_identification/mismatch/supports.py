@@ -16,6 +16,7 @@ from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem
+from rig_identification.estimate.stretching import DAMPING, STIFFNESS, TIME_CONSTANT, stretching
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -24,11 +25,8 @@ from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Frequency (Hz) and damping ratio of the ceiling, and of the cables' stretching, where a fit starts.
+#: Frequency (Hz) of the ceiling where a fit starts; its damping ratio is that of the cables' stretching.
 CEILING_FREQUENCY = 10.0
-DAMPING = 0.03
-#: Frequency (Hz) at which a body bounces on cables of the usual stiffness.
-BOUNCE = 20.0
 #: Damping ratio of a probe: it starts unloaded, and what that costs is over after a twentieth of a second.
 PROBE_DAMPING = 1.0
 
@@ -116,45 +114,21 @@ def ceiling_candidate(
     )
 
 
-def usual_stiffness(rig: Rig, mass: float) -> float:
-    """EA, N, of cables on which a body of ``mass`` kg bounces at BOUNCE."""
-    length = float(np.mean([c.length for c in rig.cables]))
-    return mass * (2.0 * np.pi * BOUNCE) ** 2 * length / len(rig.cables)
-
-
 def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:
     """Cables that stretch, all alike."""
     n = model.cables
     length = float(np.mean([c.length for c in rig.cables]))
-    stiffness, bounce = usual_stiffness(rig, mass), 2.0 * np.pi * BOUNCE
-    entries = [layout.cable_offset(i) for i in range(n)]
 
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
-        def shared(
-            name: str, unit: str, nominal: float, std: float, entry: int, bounded: bool = False
-        ) -> Parameter:
-            first, *others = (o + entry for o in entries)
-            return Parameter(name, unit, nominal, std, "physics", first, bounded, tuple(others), ratio=True)
-
-        elastic = replace(
-            model,
-            modes=np.where(model.can_slacken, layout.ELASTIC, layout.ELASTIC_ROD).astype(np.int64),
-            can_slacken=np.zeros(n, dtype=np.bool_),
-        )
-        return elastic, (
-            # Beyond a twentieth and twenty times nothing tells it from rigid, and each step takes minutes
-            shared("cable.axial_stiffness", "N", stiffness, 1.0, layout.AXIAL_STIFFNESS, bounded=True),
-            shared("cable.axial_damping", "s", 2.0 * DAMPING / bounce, 1.0, layout.AXIAL_DAMPING),
-        )
+        return stretching(rig, model, mass)
 
     def ratio(EA: float, tau: float) -> float:
         return float(0.5 * tau * np.sqrt(n * EA / length / mass))
 
     def told(found: Estimates) -> Told:
-        stiffness, damping = "cable.axial_stiffness", "cable.axial_damping"
         return {
-            "axial_stiffness": (*found.of(stiffness), "N"),
-            "damping_ratio": (*found.following(ratio, stiffness, damping), "1"),
+            "axial_stiffness": (*found.of(STIFFNESS), "N"),
+            "damping_ratio": (*found.following(ratio, STIFFNESS, TIME_CONSTANT), "1"),
         }
 
     return Candidate(
