@@ -16,6 +16,8 @@ FOLDER = Path(
     )
 )
 SESSIONS = sorted(file.parent for file in FOLDER.glob("*/session.yaml"))
+#: Sessions of the simulator whose bags hold the ground truth; the contract leaves it to the recording.
+WITH_TRUTH = {"session_a", "session_b", "session_c"}
 pytestmark = pytest.mark.skipif(
     not SESSIONS, reason=f"no sessions in {FOLDER}: set RIG_IDENTIFICATION_RECORDINGS to a folder of sessions"
 )
@@ -40,12 +42,14 @@ def test_every_session_is_read_whole(folder: Path) -> None:
 @pytest.mark.parametrize("folder", SESSIONS, ids=lambda folder: folder.name)
 def test_statics_and_truth_agree_with_the_description(folder: Path) -> None:
     session = read_session(folder)
+    if folder.name in WITH_TRUTH:
+        assert all(recording.ground_truth is not None for recording in session.recordings)
     for recording in session.statics:
         assert recording.imu is not None
         force = float(np.linalg.norm(recording.imu.values[:, 3:].mean(axis=0)))
         assert force == pytest.approx(session.rig.gravity, abs=0.1)
-        assert recording.ground_truth is not None
-        assert np.abs(recording.ground_truth.values[:, 7:]).max() < 1e-3
+        if recording.ground_truth is not None:
+            assert np.abs(recording.ground_truth.values[:, 7:]).max() < 1e-3
     for recording in session.training:
         if recording.ground_truth is not None:
             time, values = recording.ground_truth.time, recording.ground_truth.values
