@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _ORDINARY = 50e-6
 #: ppm that a slow change of latency by 0.2 ms over half a minute makes.
 _LEAST_STD = 5e-6
+#: Receive times that run this much faster or slower than the stamps are a conversion's, not a clock's.
+_NO_CLOCK = 0.01
 #: Parts of a recording in which a latency is taken.
 _PARTS = 24
 #: Samples in a part from which its median is told.
@@ -78,6 +80,8 @@ def _by_receipt(here: list[Stream]) -> list[_Drift]:
     if np.isnan(rows).all(axis=0).any():
         return []
     middle = np.nanmedian(rows, axis=0)
+    if not abs(_slope(edges, middle)[0]) < _NO_CLOCK:
+        return []
     if len({s.device for s in devices}) == 2:
         steadiest = min(devices, key=lambda s: abs(_slope(edges, table[s.key])[0]))
         middle = table[steadiest.key]

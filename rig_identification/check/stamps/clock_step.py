@@ -94,9 +94,11 @@ def _with_others(jump: Jump, here: list[Stream], tried: int) -> _Step:
                 jumps.append(other)
     fast = [j for j in jumps if j.interval <= 1.5 * jump.interval]
     size = float(np.median([_size(j) for j in fast]))
+    if size * jump.size < 0.5 * jump.size**2:
+        return _Step(jump.stream.place, tuple(jumps), size, 0.0, False)  # samples about it tell of none
     gain = sum(by_order(j) + by_receipt(j) for j in jumps) - math.log(tried)
-    if size > 0.0:
-        gain += by_values(jumps)
+    if size > 5.0 * jump.interval:
+        gain += by_values(jumps, size)
     still = [s for s in still if s.device != GROUND_TRUTH]
     if still:
         gain += sum(by_ends(j, still) for j in jumps) / len(jumps)

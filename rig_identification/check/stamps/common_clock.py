@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.check.stamps.streams import GROUND_TRUTH, SECOND, Stream
+from rig_identification.check.stamps.streams import GROUND_TRUTH, SECOND, Stream, copied
 from rig_identification.raw import Stamps
 
 Array = NDArray[np.float64]
@@ -34,15 +34,6 @@ def received_together(one: Stream, others: list[Stream]) -> bool:
     high = int(np.median([other.received.max() for other in others]))
     shared = min(int(own.max()), high) - max(int(own.min()), low)
     return shared > _WITHIN * min(span, high - low) and high > low
-
-
-def copied(one: Stream) -> bool:
-    """Whether receive times are the stamps with a constant added, as a conversion may write them.
-
-    What is off by more than a latency is no copy: one of the two is on a clock of its own.
-    """
-    wait = one.received - one.stamps
-    return bool(np.ptp(wait) < 1000 and 0 <= wait[0] < 2 * ORDINARY * SECOND)
 
 
 def steady(one: Stream) -> bool:
@@ -74,7 +65,7 @@ def placement(one: Stream, others: list[Stream], recorded: Stream) -> Placement 
     others = [other for other in others if other.device != GROUND_TRUTH] or others
     if not others:
         return None
-    if not copied(recorded) and steady(one) and received_together(one, others):
+    if not copied(recorded.channel) and steady(one) and received_together(one, others):
         usual = [latency(other.stamps, other.received) for other in others]
         middle = float(np.median(usual))
         spread = float(np.median(np.abs(np.array(usual) - middle))) * 1.5

@@ -12,10 +12,10 @@ from rig_identification.check.stamps.regular import (
     TOGETHER,
     Grid,
     envelope_grid,
+    lossless_interval,
     mean_interval,
     rate_line,
     seconds,
-    usual_interval,
 )
 from rig_identification.check.stamps.streams import SECOND, Stream
 from rig_identification.raw import Stamps
@@ -58,14 +58,34 @@ def late(stream: Stream, tolerance: float) -> Late | None:
         return None
     short = steps < TOGETHER * mean
     gain = len(steps) * _relative_entropy(float(np.mean(short)), _ORDINARY_TOGETHER)
-    interval = None
-    if gain <= 0.0:
-        interval = usual_interval(times)
-        interval, agreement = rate_line(times)
-        gain = _one_sided(times, interval) if agreement > _AGREEING else 0.0
+    rounding = resolution(stream.stamps)
+    if gain > 0.0 and rounding > 0.3 * mean and np.median(steps[~short]) < 1.5 * max(mean, rounding):
+        gain = 0.0  # rounding puts them together, not a driver
+    interval = lossless_interval(times)
+    turns, agreement = 0.0 * times, 1.0
+    if interval is not None:
+        turns = times / interval - np.arange(len(times))
+    else:
+        sought, agreement = rate_line(times)
+        turns = _phases(times / sought)
+        interval = sought if gain <= 0.0 else None
+    if agreement > _AGREEING:
+        gain = max(gain, _one_sided(turns, rounding / mean))
     if gain <= 0.0:
         return None
-    return _on_grid(stream, fresh, envelope_grid(times, interval), gain, short, steps)
+    grid = envelope_grid(times, interval)
+    low, high = np.quantile(grid.late, [0.05, 0.95])
+    if high - low < 2.0 * (tolerance + rounding):
+        return None
+    return _on_grid(stream, fresh, grid, gain, short, steps)
+
+
+def resolution(stamps: Stamps) -> float:
+    """s, the power of ten of which nineteen in twenty stamps are multiples, from the first one on."""
+    power, since = 1, stamps - stamps[0]
+    while power < SECOND and np.mean(since % (10 * power) == 0) > 0.95:
+        power *= 10
+    return power / SECOND
 
 
 def _on_grid(
@@ -95,25 +115,31 @@ def _fresh(stream: Stream) -> tuple[Array, NDArray[np.bool_]]:
     return seconds(stream.stamps)[fresh], fresh
 
 
-def _one_sided(times: Array, interval: float) -> float:
-    """Nats for deviations from regular sampling that are late more often than early.
+def _phases(turns: Array) -> Array:
+    """(n,) intervals by which times lie off the nearest of their regular times, for the best-lying such."""
+    middle = np.angle(np.mean(np.exp(2j * np.pi * turns))) / (2.0 * np.pi)
+    return np.asarray(np.mod(turns - middle + 0.5, 1.0) - 0.5)
+
+
+def _one_sided(deviations: Array, rounding: float) -> float:
+    """Nats for deviations from regular sampling (in intervals) that are late more often than early.
 
     Of the largest deviations about their middle, ordinary jitter has as many on either side, whatever its
-    law.
-    Deviations that last several samples count once.
+    law. Rounding moves the middle by up to half of its step. Deviations that last several samples count once.
     """
-    turns = times / interval
-    middle = np.angle(np.mean(np.exp(2j * np.pi * turns))) / (2.0 * np.pi)
-    phase = np.mod(turns - middle + 0.5, 1.0) - 0.5
-    phase = np.mod(phase - np.median(phase) + 0.5, 1.0) - 0.5
-    size = np.abs(phase)
-    largest = size > np.quantile(size, 1.0 - _LARGEST)
-    late_part = float(np.mean(phase[largest] > 0.0))
-    if late_part <= 0.5 or np.std(phase) == 0.0:
+    about = deviations - np.median(deviations)
+    if np.std(about) == 0.0:
         return 0.0
-    relation = float(np.clip(np.corrcoef(phase[1:], phase[:-1])[0, 1], 0.0, 0.999))
-    independent = np.count_nonzero(largest) * (1.0 - relation) / (1.0 + relation)
-    return float(independent) * _relative_entropy(late_part, 0.5)
+    relation = float(np.clip(np.corrcoef(about[1:], about[:-1])[0, 1], 0.0, 0.999))
+    independent = _LARGEST * len(about) * (1.0 - relation) / (1.0 + relation)
+    moved = (about + part * rounding for part in (-0.5, 0.0, 0.5))
+    return independent * min(_relative_entropy(_late_part(one), 0.5) for one in moved)
+
+
+def _late_part(phase: Array) -> float:
+    """Part of the largest deviations that are late."""
+    size = np.abs(phase)
+    return float(np.mean(phase[size >= np.quantile(size, 1.0 - _LARGEST)] > 0.0))
 
 
 def _relative_entropy(part: float, ordinary: float) -> float:

@@ -18,6 +18,8 @@ from rig_identification.raw import RawSession, Stamps
 ORDER = 10
 
 _BITS_32 = 2**32
+#: Steps back and forth by one period from which they are no clock's.
+_BACK_AND_FORTH = 4
 #: Periods (ns) of counters that wrap around, and what they count.
 _PERIODS = {
     _BITS_32: "nanoseconds in 32 bits",
@@ -50,7 +52,7 @@ def find(session: RawSession) -> tuple[Found, ...]:
 
 def _mend(stream: Stream) -> Mended | None:
     tried = [_unwrapped(stream.stamps, period) for period in _PERIODS]
-    tried.append(_low_part(stream.stamps))
+    tried += [_low_part(stream.stamps, lowest) for lowest in (0, -(2**31))]
     best: Mended | None = None
     for one in tried:
         if one is not None and np.any(one.stamps != stream.stamps):
@@ -61,27 +63,38 @@ def _mend(stream: Stream) -> Mended | None:
 
 
 def _unwrapped(stamps: Stamps, period: int) -> _Unwrapped | None:
-    """Stamps with a period added at every step back by about one."""
+    """Stamps with a period added at every step back by about one.
+
+    They stay within a period, or have the seconds right and a fraction that is negative in half of each.
+    """
     steps = np.diff(stamps)
     turns = np.where(np.abs(steps) > 0.9 * period, np.round(-steps / period), 0).astype(np.int64)
-    if not turns.any() or np.abs(turns).max() > 1 or np.ptp(stamps) > 1.01 * period:
+    added = np.concatenate(([0], np.cumsum(turns)))
+    if not turns.any() or np.abs(turns).max() > 1:
         return None
-    return _Unwrapped(stamps + period * np.concatenate(([0], np.cumsum(turns))), period)
+    back_and_forth = np.ptp(added) == 1 and np.count_nonzero(turns) >= _BACK_AND_FORTH
+    if np.ptp(stamps) > 1.01 * period and not back_and_forth:
+        return None
+    if back_and_forth and added.min() < 0:
+        added += 1  # the side without a period taken off is right
+    return _Unwrapped(stamps + period * added, period)
 
 
-def _low_part(stamps: Stamps) -> _Unwrapped | None:
+def _low_part(stamps: Stamps, lowest: int) -> _Unwrapped | None:
     """Right seconds with, as nanoseconds, the low 32 bits of all nanoseconds since 1970.
 
-    A stamp is then S + (t mod 2^32) for the time t in second S. Each second that it may have been gives at
-    most one t; the samples with a single one tell which of the others' is right.
+    A stamp is then S + (t mod 2^32) for the time t in second S, the remainder from ``lowest`` on. Each
+    second that it may have been gives at most one t; the samples with a single one tell which of the others'
+    is right.
     """
     whole = stamps // SECOND
     choices = []
-    for back in range(_BITS_32 // SECOND + 1):
+    for back in range(lowest // SECOND - 1, (lowest + _BITS_32) // SECOND + 1):
         second = (whole - back) * SECOND
         low = stamps - second
         fraction = (low - second) % _BITS_32
-        choices.append(np.where((low < _BITS_32) & (fraction < SECOND), second + fraction, -1))
+        fits = (low >= lowest) & (low < lowest + _BITS_32) & (fraction < SECOND)
+        choices.append(np.where(fits, second + fraction, -1))
     table = np.array(choices)
     possible = table >= 0
     single = np.flatnonzero(possible.sum(axis=0) == 1)

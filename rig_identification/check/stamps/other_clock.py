@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from rig_identification.check.found import Found
-from rig_identification.check.stamps.common_clock import ORDINARY, copied, latency, received_together, steady
-from rig_identification.check.stamps.streams import GROUND_TRUTH, SECOND, Stream, streams, with_stamps
+from rig_identification.check.stamps.common_clock import ORDINARY, latency, received_together, steady
+from rig_identification.check.stamps.streams import GROUND_TRUTH, SECOND, Stream, copied, streams, with_stamps
 from rig_identification.check.stamps.told import PRICE, found, owner, quantity, recordings_text
 from rig_identification.raw import RawSession, Stamps
 
@@ -22,6 +22,8 @@ _ZONE = 900.0  # s; time zones differ by quarters of an hour
 _LONGEST_ZONE = 14 * 3600.0
 #: s. An offset is one of the known ones where it lies this near: the latencies of two devices differ by less.
 _NEAR = 0.5
+#: s. Both ends of a stream that overlaps the others' lie off by the same within this.
+_BOTH_ENDS = 0.1
 #: Stamps before this are no time of day: a clock that counts from its own start.
 _SINCE_START = 10**9 * SECOND // 3
 
@@ -95,9 +97,12 @@ def _apart(here: list[Stream]) -> list[_Off]:
     together = all(received_together(s, [o for o in devices if o.device != s.device]) for s in devices)
     delays = {s.key: -latency(s.stamps, s.received) for s in here} if together else {}
     groups = _clusters(devices, delays)
-    if len(groups) < 2 and all(map(copied, devices)):
+    if len(groups) < 2 and all(copied(s.channel) for s in devices):
         delays = {}
         groups = _clusters(devices, delays)
+        groups[0] = _covering(groups[0])
+        if 2 * len({s.device for s in groups[0]}) <= len({s.device for s in devices}):
+            return []  # streams that cover parts of the recording, of which none is the measure
     if len(groups) < 2:
         return []
     reference = _reference(groups, delays)
@@ -132,6 +137,13 @@ def _clusters(devices: list[Stream], delays: dict[tuple[int, str], float]) -> li
             groups.append([])
         groups[-1].append(stream)
     return sorted(groups, key=size, reverse=True)
+
+
+def _covering(group: list[Stream]) -> list[Stream]:
+    """Those of some streams that start and end together."""
+    starts, ends = (np.array([f(s.stamps) for s in group]) for f in (np.min, np.max))
+    off = np.maximum(np.abs(starts - int(np.median(starts))), np.abs(ends - int(np.median(ends))))
+    return [s for s, far in zip(group, off, strict=True) if far < ORDINARY / 2.0 * SECOND]
 
 
 def _reference(groups: list[list[Stream]], delays: dict[tuple[int, str], float]) -> list[Stream]:
@@ -169,7 +181,8 @@ def _by_ends(stream: Stream, reference: list[Stream]) -> _Off | None:
     first, last = (int(np.median([int(f(s.stamps)) for s in reference])) for f in (np.min, np.max))
     start, end = (int(stream.stamps.min()) - first) / SECOND, (int(stream.stamps.max()) - last) / SECOND
     offset, std = (start + end) / 2.0, max(abs(end - start) / 2.0, 0.02)
-    if abs(end - start) <= min(0.2 * abs(offset), ORDINARY):
+    disjoint = abs(offset) > 2.0 * (last - first) / SECOND
+    if abs(end - start) <= (ORDINARY if disjoint else _BOTH_ENDS):
         return _Off(stream, offset, std, _known(offset))
     # One end lies outside of the recording, by an offset that puts the whole stream inside.
     outside = end if offset > 0 else start

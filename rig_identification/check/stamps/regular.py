@@ -81,7 +81,7 @@ def envelope_grid(times: Array, interval: float | None = None) -> Grid:
     intervals: what is below the envelope later on was not late before. interval: s, where it is known.
     """
     if interval is None:
-        interval = _lossless_interval(times)
+        interval = lossless_interval(times)
         interval = _sought_interval(times) if interval is None else interval
     index, start = np.zeros(len(times), np.int64), 0.0
     for _ in range(2):
@@ -90,7 +90,7 @@ def envelope_grid(times: Array, interval: float | None = None) -> Grid:
     return Grid(start, interval, index, times - start - interval * index)
 
 
-def _lossless_interval(times: Array) -> float | None:
+def lossless_interval(times: Array) -> float | None:
     """Interval (s) of a stream that lost nothing, as its envelope shows; None where it is not straight."""
     count = np.arange(len(times))
     interval, start = _line(times, count)

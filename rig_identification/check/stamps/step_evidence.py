@@ -24,6 +24,8 @@ _LATENCY_CHANGE = 0.005
 _END = 0.05
 #: Moments at which the values' changes are taken to see how much is usual.
 _MOMENTS = 300
+#: s; smaller steps are within what the fit takes for an offset between clocks, or a loss.
+_SMALLEST = 0.02
 #: Samples averaged on either side of a jump.
 _MEAN = 3
 #: Nats beyond which one source of evidence is not counted: its own model is not that sure.
@@ -41,26 +43,48 @@ class Jump:
 
 
 def lasting_jumps(stream: Stream) -> list[Jump]:
-    """Places where the stamps lead back over two intervals, or on over five and 20 ms, and stay there."""
+    """Places where the stamps lead back over two intervals, or on over five and 20 ms, and stay there.
+
+    Smaller ones from 20 ms on are looked at where receive times do not follow them.
+    """
     times = (stream.stamps - stream.stamps[0]) / SECOND
     steps = np.diff(times)
     interval = usual_interval(times)
     if interval <= 0.0:
         return []
     size = steps - interval
-    places = np.flatnonzero((size < -2.0 * interval) & (steps < 0) | (size > max(5.0 * interval, 0.02)))
-    if not len(places):
-        return []
+    large = (size < -2.0 * interval) & (steps < 0) | (size > max(5.0 * interval, _SMALLEST))
+    small = ~large & (np.abs(size) > max(0.5 * interval, _SMALLEST))
+    if small.any():
+        small &= _not_received(stream, size)
     lag = min(LASTING, len(times) // 4)
     usual = float(np.median(times[lag:] - times[:-lag]))
     result = []
-    for place in places.tolist():
+    for place in np.flatnonzero(large | small).tolist():
         first, last = max(place + 1 - lag, 0), min(place + 1, len(times) - lag)
         if last - first >= 10:
             across = float(np.median(times[first + lag : last + lag] - times[first:last])) - usual
-            if 0.5 < across / size[place] < 1.5:
+            if small[place] or 0.5 < across / size[place] < 1.5:
                 result.append(Jump(stream, place + 1, interval, float(size[place])))
     return result
+
+
+def _not_received(stream: Stream, size: Array) -> NDArray[np.bool_]:
+    """(n - 1,) where stamps jump against receive times, by the medians of five samples on either side."""
+    if len(size) < 10 or not runs_along(stream):
+        return np.zeros(len(size), bool)
+    ahead = (stream.stamps - stream.received).astype(np.float64) / SECOND
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(ahead, 5), axis=1)
+    change = np.zeros(len(size))
+    change[4 : 4 + len(medians) - 5] = medians[5:] - medians[:-5]
+    return np.asarray(np.abs(change - size) < 0.3 * np.abs(size))
+
+
+def runs_along(stream: Stream) -> bool:
+    """Whether receive times advance as the stamps do over a second or so, as a clock does."""
+    lag = min(LASTING, len(stream.stamps) // 4)
+    stamped, received = (np.median(t[lag:] - t[:-lag]) for t in (stream.stamps, stream.received))
+    return bool(abs(received - stamped) < 0.1 * stamped)
 
 
 def by_order(jump: Jump) -> float:
@@ -78,6 +102,8 @@ def stamps_max(jump: Jump) -> int:
 
 def by_receipt(jump: Jump) -> float:
     """Nats for a step of the stamps against receive times that go on; none where both step."""
+    if not runs_along(jump.stream):
+        return 0.0
     ahead = (jump.stream.stamps - jump.stream.received).astype(np.float64) / SECOND
     before, after = (
         ahead[max(jump.after - LASTING, 0) : jump.after], ahead[jump.after : jump.after + LASTING]
@@ -89,22 +115,33 @@ def by_receipt(jump: Jump) -> float:
 
 
 def by_ends(jump: Jump, others: list[Stream]) -> float:
-    """Nats for the stream's start and end to lie with those of streams without a jump, once it is undone.
-
-    Ordinary differences at the start are Gaussian with a fifth of what a recorder may take to subscribe.
-    """
+    """Nats for the stream's start and end to lie with those of streams without a jump, once it is undone."""
     if not others:
         return 0.0
     first, last = (int(np.median([int(f(s.stamps)) for s in others])) for f in (np.min, np.max))
-    start = (int(jump.stream.stamps.min()) - first) / SECOND
+    length = max((last - first) / SECOND, 1.0)
+    start = (first - int(jump.stream.stamps.min())) / SECOND
     end = (int(jump.stream.stamps[jump.after :].max()) - last) / SECOND
-    at_end = 0.5 * (end**2 - (end - jump.size) ** 2) / _END**2
-    at_start = 0.5 * (start**2 - (start + jump.size) ** 2) / (ORDINARY / 5.0) ** 2
+    at_end = _usual_end(end - jump.size, _END, length) - _usual_end(end, _END, length)
+    at_start = _usual_end(start - jump.size, ORDINARY / 5.0, length) - _usual_end(
+        start, ORDINARY / 5.0, length
+    )
     return float(np.clip(max(at_end, at_start), -_CAP, _CAP))
 
 
-def by_values(jumps: list[Jump]) -> float:
-    """Nats for the values to go on over a jump as from one sample to the next, and not as over its length.
+def _usual_end(outside: float, std: float, length: float) -> float:
+    """Log density (1/s) of the time (s) by which a stream goes on outside of what the others cover.
+
+    Mostly Gaussian. A stream in ten covers a part of the recording only; that it alone goes on takes a
+    recorder that lost all others at once.
+    """
+    alone = 0.1 if outside < 0.0 else 1e-6
+    gauss = math.exp(-0.5 * min((outside / std) ** 2, 1e3)) / (std * math.sqrt(2.0 * math.pi))
+    return math.log(0.9 * gauss + alone / length)
+
+
+def by_values(jumps: list[Jump], length: float) -> float:
+    """Nats for the values to go on over a jump as from one sample to the next, not as over ``length`` (s).
 
     Changes of all columns over both are Gaussian, with the covariances that they have elsewhere in the
     recording; what columns tell in common so counts once. At rest the two are alike and nothing is told.
@@ -115,7 +152,7 @@ def by_values(jumps: list[Jump]) -> float:
     for jump in jumps:
         columns = jump.stream.channel.values
         columns = columns[:, np.isfinite(columns).all(axis=0)]
-        size = round(jump.size / jump.interval)
+        size = round(length / jump.interval)
         if (
             not columns.shape[1]
             or len(columns) < 2 * (size + 2 * _MEAN)

@@ -52,6 +52,15 @@ class Stream:
         return self.place, self.channel.topic
 
 
+def copied(channel: RawChannel) -> bool:
+    """Whether receive times are the stamps with a constant added, as a conversion may write them.
+
+    What is off by more than a latency is no copy: one of the two is on a clock of its own.
+    """
+    wait = channel.received_ns - channel.stamp_ns
+    return len(wait) > 0 and bool(np.ptp(wait) < 1000 and 0 <= wait[0] < SECOND)
+
+
 def streams(session: RawSession, place: int | None = None) -> Iterator[Stream]:
     """Streams with enough stamps to judge, of one recording or of all."""
     for number, recording in enumerate(session.recordings):
@@ -62,10 +71,16 @@ def streams(session: RawSession, place: int | None = None) -> Iterator[Stream]:
 
 
 def with_stamps(session: RawSession, stamps: Mapping[tuple[int, str], Stamps]) -> RawSession:
-    """The session with other stamps (ns) in the streams of these keys."""
+    """The session with other stamps (ns) in these streams; receive times that copy them go along."""
 
     def changed(channel: RawChannel, key: tuple[int, str]) -> RawChannel:
-        return replace(channel, stamp_ns=np.asarray(stamps[key], np.int64)) if key in stamps else channel
+        if key not in stamps:
+            return channel
+        other = np.asarray(stamps[key], np.int64)
+        received = channel.received_ns
+        if copied(channel):
+            received = other + (received - channel.stamp_ns)
+        return replace(channel, stamp_ns=other, received_ns=received)
 
     return _changed(session, changed)
 
