@@ -6,7 +6,7 @@ examiners left it: a clock that they corrected runs with the others again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,10 +45,13 @@ def inventory(raw: RawSession, used: RawSession) -> tuple[TopicAccount, ...]:
     raw: the session as recorded; used: the same with the faults that were found undone, without the channels
     that the examination left out.
     """
+    left = {recording.name: recording for recording in used.recordings}
     return tuple(
         account
-        for recording, left in zip(raw.recordings, used.recordings, strict=True)
-        for account in _recording_accounts(recording, left, raw.rig)
+        for recording in raw.recordings
+        for account in _recording_accounts(
+            recording, left.get(recording.name, replace(recording, channels=())), raw.rig
+        )
     )
 
 

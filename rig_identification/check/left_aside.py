@@ -182,8 +182,9 @@ def _apart(used: RawSession) -> Iterator[str]:
 
 def _dropped(raw: RawSession, used: RawSession) -> Iterator[str]:
     found: dict[str, list[str]] = {}
-    for recording, left in zip(raw.recordings, used.recordings, strict=True):
-        kept = {channel.topic for channel in left.channels}
+    left = {recording.name: recording for recording in used.recordings}
+    for recording in raw.recordings:
+        kept = {c.topic for c in left[recording.name].channels} if recording.name in left else set()
         for channel in recording.channels:
             if channel.topic not in kept:
                 found.setdefault(channel.topic, []).append(recording.name)

@@ -46,7 +46,7 @@ class Evidence:
     _without: dict[frozenset[str], Account] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.plain = self.account(self.session)
+        self.plain = self._account(self.session)
 
     @property
     def cells(self) -> frozenset[str]:
@@ -58,7 +58,7 @@ class Evidence:
         if devices not in self._without:
             recordings = tuple(_lacking(r, devices) for r in self.session.recordings)
             lacking = ReducedSession(self.session.rig, recordings)
-            self._without[devices] = self.account(lacking, self.plain)
+            self._without[devices] = self._account(lacking, None, self.plain, bool(devices & MOVING))
         return self._without[devices]
 
     def bound(self, devices: frozenset[str]) -> float:
@@ -73,7 +73,8 @@ class Evidence:
         fresh = thorough or hypothesis.fresh
         start = None if fresh else self.without(hypothesis.about)
         if start is None or start.rest is None:
-            return self._account(changed, hypothesis.loosened, self.plain)
+            moved = bool(hypothesis.about & MOVING) or hypothesis.change.rig is not None
+            return self._account(changed, hypothesis.loosened, self.plain, moved)
         devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
         recordings = changed.at_rest
         if hypothesis.about == {"imu.gyroscope"}:
@@ -98,13 +99,18 @@ class Evidence:
     def _rest_nats(self, square: float) -> float:
         return 0.5 * self.readings * float(np.log1p(square / self.readings))
 
-    def account(self, session: ReducedSession, begun: Account | None = None) -> Account:
-        """Evaluate a session from scratch; begun: another account whose motions are tried as starts too."""
-        return self._account(session, None, begun)
-
     def _account(
-        self, session: ReducedSession, loosened: Loosened | None, begun: Account | None = None
+        self,
+        session: ReducedSession,
+        loosened: Loosened | None = None,
+        begun: Account | None = None,
+        moved: bool = True,
     ) -> Account:
+        """Evaluate a session from scratch.
+
+        begun: another account, from whose motions a fit is tried as well; moved: whether the motion may differ
+        from those at all.
+        """
         rest = fit_rest(session.rig, session.at_rest, loosened)
         if rest is None:
             return Account(None, (), float("inf"), {})
@@ -113,14 +119,21 @@ class Evidence:
         parts = {"rest": self._rest_nats(rest.square)}
         motions = []
         for k, run in enumerate(session.runs[:RUNS]):
-            model = MotionModel(session.rig, run, *rest.poses[0])
-            tried = [model.settled(run.values)]
-            if begun is not None and begun.motions:
-                tried.append(model.settled(run.values, begun.motions[k].trajectory))
-            motion = min(tried, key=lambda fit: fit.total)
+            motion = _motion(session.rig, run, rest, begun.motions[k] if begun and begun.motions else None, moved)
             motions.append(motion)
             parts |= _parts(session.rig, run, rest, motion)
         return Account(rest, tuple(motions), float(sum(parts.values())), parts)
+
+
+def _motion(rig: Rig, run: Reduced, rest: RestFit, begun: MotionFit | None, moved: bool) -> MotionFit:
+    """The motion of one run, from rest and from another account's."""
+    if begun is not None and not moved:
+        return begun
+    model = MotionModel(rig, run, *rest.poses[0])
+    tried = [model.settled(run.values)]
+    if begun is not None:
+        tried.append(model.settled(run.values, begun.trajectory))
+    return min(tried, key=lambda fit: fit.total)
 
 
 def _parts(rig: Rig, run: Reduced, rest: RestFit, motion: MotionFit) -> dict[str, float]:

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.motion import ACROSS, ORDINARY, TINY, Trajectory, nats
 from rig_identification.check.consistency.rest import SCALE, RestFit
-from rig_identification.model.so3 import skew
+from rig_identification.statics.balance import skew
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]

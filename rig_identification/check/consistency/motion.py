@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.reduced import PER_SPAN, Reduced
 from rig_identification.check.consistency.rest import BIAS, DOUBT, LENGTH, TILT
-from rig_identification.model.so3 import skew
+from rig_identification.statics.balance import skew
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -52,6 +52,8 @@ BLOCKS = {
 }
 #: A pose leaves rest by so much, where no reading holds it: share of the cables' length, and rad.
 AWAY = 0.2
+#: rad; a rotation vector beyond half a turn stands for another attitude, and no body hangs so.
+UPSIDE_DOWN = np.pi
 #: Fits settle in fewer steps; one that improves by less than a tenth of a nat has settled.
 STEPS, SETTLED = 8, 0.1
 
@@ -77,15 +79,15 @@ class Trajectory:
     def rate(self) -> Array:
         """(N, 3) rad/s, body axes, to third order of the turn."""
         q, v = self.turn, self.turn_rate
-        once = np.cross(q, v)
-        return np.asarray(v - 0.5 * once + np.cross(q, once) / 6.0)
+        once = cross(q, v)
+        return np.asarray(v - 0.5 * once + cross(q, once) / 6.0)
 
     @property
     def rate_change(self) -> Array:
         """(N, 3) rad/s^2."""
         q, v, a = self.turn, self.turn_rate, self.turn_change
-        once = np.cross(q, a)
-        twice = np.cross(v, np.cross(q, v)) + np.cross(q, once)
+        once = cross(q, a)
+        twice = cross(v, cross(q, v)) + cross(q, once)
         return np.asarray(a - 0.5 * once + twice / 6.0)
 
     def proper_acceleration(self, gravity: float) -> Array:
@@ -160,7 +162,10 @@ class MotionModel:
         """Fit the motion to readings by device (N, width), linear about a trajectory, by default rest."""
         at = about or self.at_rest()
         blocks = self._blocks(at, values)
-        change, constants = self.spline.solve(blocks)
+        try:
+            change, constants = self.spline.solve(blocks)
+        except (np.linalg.LinAlgError, ValueError):  # a motion that has left every bound has no next step
+            return self._seen(values, at)
         left = {b.name: self.spline.left(b, change, constants[b.name]) for b in blocks}
         return self._judged(blocks, left, self._moved(at, change))
 
@@ -169,24 +174,39 @@ class MotionModel:
         return self._seen(values, self.fit(values, about).trajectory)
 
     def settled(self, values: Mapping[str, Array], about: Trajectory | None = None) -> MotionFit:
-        """The same, linearised anew about the motion that was found until it settles."""
-        best = self._seen(values, about or self.at_rest())
-        at = best.trajectory
-        for _ in range(STEPS):
-            found = self._seen(values, self.fit(values, at).trajectory)
-            at = found.trajectory
-            done = found.total > best.total - SETTLED
-            if found.total < best.total:
-                best = found
-            elif done and found.total < 2.0 * best.total:
+        """The same, linearised anew about the motion that was found until it settles.
+
+        From rest a large swing is overshot at first: a step that doubles the cost or more is taken all the
+        same, and the best motion of all is kept.
+        """
+        at = about or self.at_rest()
+        best: MotionFit | None = None
+        for _ in range(STEPS + 1):
+            blocks = self._blocks(at, values)
+            seen = self._looked_at(blocks, at)
+            if best is not None and (not np.isfinite(seen.total) or _upside_down(at)):
                 break
+            gained = np.inf if best is None else best.total - seen.total
+            if best is None or gained > 0.0:
+                best = seen
+            if -best.total < gained < SETTLED:
+                break
+            at = self._stepped(blocks, at)
+        assert best is not None
         return best
+
+    def _stepped(self, blocks: list[_Block], at: Trajectory) -> Trajectory:
+        try:
+            return self._moved(at, self.spline.solve(blocks)[0])
+        except (np.linalg.LinAlgError, ValueError):  # a motion that has left every bound has no next step
+            return at
 
     def _seen(self, values: Mapping[str, Array], at: Trajectory) -> MotionFit:
         """What a trajectory leaves of the readings, each reading's constant taken off."""
-        blocks = self._blocks(at, values)
-        left = {b.name: b.miss - _constant(b) for b in blocks}
-        return self._judged(blocks, left, at)
+        return self._looked_at(self._blocks(at, values), at)
+
+    def _looked_at(self, blocks: list[_Block], at: Trajectory) -> MotionFit:
+        return self._judged(blocks, {b.name: b.miss - _constant(b) for b in blocks}, at)
 
     def _judged(self, blocks: list[_Block], left: Mapping[str, Array], at: Trajectory) -> MotionFit:
         cost, remains = {}, {}
@@ -270,11 +290,11 @@ class MotionModel:
         R_imu, arm = _rotation(mount), mount.position
         proper = at.proper_acceleration(self.rig.gravity)
         rate, change = at.rate, at.rate_change
-        body = proper + np.cross(change, arm) + np.cross(rate, np.cross(rate, arm))
+        body = proper + cross(change, arm) + cross(rate, cross(rate, arm))
         by_pose = np.zeros((R.shape[0], 3, 6))
         by_pose[:, :, 3:] = R_imu.T @ skew(proper)
         by_rate = np.zeros_like(by_pose)
-        across = np.cross(rate, arm)
+        across = cross(rate, arm)
         by_rate[:, :, 3:] = -R_imu.T @ (skew(across) + skew(rate) @ skew(arm))
         by_change = np.zeros_like(by_pose)
         by_change[:, :, :3] = R_imu.T @ np.swapaxes(R, 1, 2)
@@ -391,14 +411,29 @@ class _Spline:
         return left
 
 
+def _upside_down(at: Trajectory) -> bool:
+    return bool(np.max(np.abs(at.turn)) > UPSIDE_DOWN)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """(..., 3) a x b; numpy's own spends ten times as long on finding out the axes of small arrays."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out
+
+
 def _spread(reading: Array) -> Array:
     """(w,) std of the readings, zero where nothing is measured."""
-    return np.asarray(np.ma.masked_invalid(reading).std(axis=0).filled(0.0))
+    return np.sqrt(np.nan_to_num(_mean((reading - _mean(reading)) ** 2)))
 
 
 def _mean(rows: Array) -> Array:
     """(w,) means of what is measured, NaN where nothing is."""
-    return np.asarray(np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan))
+    known = np.isfinite(rows)
+    count = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    return np.asarray(np.where(known, rows, 0.0).sum(axis=0) / count)
 
 
 def _constant(block: _Block) -> Array:

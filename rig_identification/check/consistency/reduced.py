@@ -196,7 +196,7 @@ def _mean_of(run: Reduced) -> Reduced:
 
 def _mean(rows: Array) -> Array:
     """(1, w) means of what is measured, NaN where nothing is."""
-    return np.asarray(np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan))[None]
+    return np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan)[None]
 
 
 def _variance(rows: Array) -> Array:

@@ -131,7 +131,7 @@ class RestModel:
         ) * np.ones(n)
         std[self.columns["tilt"]] = max(TILT, DOUBT * tolerance["inclinometer_orientation"])
         std[self.columns["bias"]] = rig.gravity * max(BIAS, DOUBT * tolerance["imu_orientation"])
-        heavy = np.array([r.dummy.mass if r.dummy else 1e-9 for r in self.recordings])
+        heavy = np.array([r.dummy.mass if r.dummy else 1.0 for r in self.recordings])
         std[self.columns["dummy_mass"]] = heavy * (FREE if loose.dummy_mass else DUMMY_MASS)
         std[self.columns["dummy_place"]] = self.span * (FREE if loose.dummy_place else DUMMY_PLACE)
         return std

@@ -31,7 +31,7 @@ def _pounds(mass: float) -> Hypothesis:
         return fault(
             "mass_error",
             {"channel": "description", "kind": "pounds"},
-            {"factor": (POUND, 0.0, "kg per lb")},
+            {"factor": (POUND, 0.0, "kg per lb"), "mass": (POUND * mass, 0.0, "kg")},
             f"The mass of the rig description, {mass:g}, is in pounds, not in kg.",
             "Give the mass in kg.",
             f"mass: {POUND * mass:.6g}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,10 @@ ANGLES = {"degrees": np.pi / 180.0, "milliradians": 0.001}
 LENGTHS = {"mm": 0.001, "cm": 0.01, "inches": INCH, "feet": 12.0 * INCH}
 
 
+#: A rig's cables differ in length by less than this factor: a length in another unit stands out by more.
+APART = 10.0
+
+
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
     """Every unit of every device; cells all together and each by itself."""
     cells = [c.name for c in evidence.session.rig.cables]
@@ -45,6 +49,13 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
         )
     for unit, factor in LENGTHS.items():
         yield _description(unit, factor)
+        if evidence.session.rig.imu is not None:
+            yield _imu_position(unit, factor)
+        longest = max(c.length for c in evidence.session.rig.cables)
+        for cable in evidence.session.rig.cables:
+            if longest / APART < factor * cable.length:
+                yield _cable_length(cable.name, unit, factor)
+        yield from _dummy_places(evidence, unit, factor)
 
 
 def _device(
@@ -61,11 +72,12 @@ def _device(
     channel: object = devices[0] if len(devices) == 1 else list(devices)
 
     def describe(rest: RestFit | None) -> SetupFault:
+        verb = "are" if quantity == "angles" else "is"
         return fault(
             "unit",
             {"channel": channel, "quantity": quantity.replace(" ", "_"), "unit": unit},
             {"factor": (factor, 0.0, f"{right} per {unit}")},
-            f"The {quantity} of {name} is recorded in {unit}, not in {right}.",
+            f"The {quantity} of {name} {verb} recorded in {unit}, not in {right}.",
             f"Multiply by {factor:.6g} in the driver: publish {right}.",
         )
 
@@ -99,6 +111,48 @@ def _description(unit: str, factor: float) -> Hypothesis:
         Change(rig=lambda rig: _in_metres(rig, factor)), describe, frozenset(["imu.accelerometer"]),
         variants=len(LENGTHS), fresh=True,
     )  # fmt: skip
+
+
+def _imu_position(unit: str, factor: float) -> Hypothesis:
+    def right(rig: Rig) -> Rig:
+        mount = rig.imu
+        return rig if mount is None else replace(rig, imu=replace(mount, position=factor * mount.position))
+
+    describe = _told("imu", "position", "The IMU's position in the rig description", unit, factor)
+    return Hypothesis(
+        Change(rig=right), describe, frozenset(["imu.accelerometer"]), variants=len(LENGTHS), fresh=True
+    )
+
+
+def _cable_length(name: str, unit: str, factor: float) -> Hypothesis:
+    def right(rig: Rig) -> Rig:
+        cables = (replace(c, length=factor * c.length) if c.name == name else c for c in rig.cables)
+        return replace(rig, cables=tuple(cables))
+
+    describe = _told(name, "length", f"The length of {name} in the rig description", unit, factor)
+    return Hypothesis(Change(rig=right), describe, frozenset(["rest"]), variants=len(LENGTHS), fresh=True)
+
+
+def _dummy_places(evidence: Evidence, unit: str, factor: float) -> Iterator[Hypothesis]:
+    loaded = {r.name: r.dummy for r in evidence.session.recordings if r.dummy is not None}
+    size = max(float(np.max(np.abs(c.body_point))) for c in evidence.session.rig.cables)
+    if any(np.max(np.abs(dummy.position)) > APART * size for dummy in loaded.values()):
+        dummies = {name: replace(dummy, position=factor * dummy.position) for name, dummy in loaded.items()}
+        describe = _told("session", "dummy_position", "The place of the known mass", unit, factor)
+        yield Hypothesis(
+            Change(dummies=dict(dummies)), describe, frozenset(["rest"]), variants=len(LENGTHS), fresh=True
+        )
+
+
+def _told(
+    channel: str, quantity: str, what: str, unit: str, factor: float
+) -> Callable[[RestFit | None], SetupFault]:
+    def describe(rest: RestFit | None) -> SetupFault:
+        where = {"channel": channel, "quantity": quantity, "unit": unit}
+        numbers = {"factor": (factor, 0.0, f"m per {unit}")}
+        return fault("unit", where, numbers, f"{what} is in {unit}, not in m.", f"Multiply it by {factor:g}.")
+
+    return describe
 
 
 def _in_metres(rig: Rig, factor: float) -> Rig:
