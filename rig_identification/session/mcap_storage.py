@@ -47,7 +47,7 @@ def collect_mcap(path: Path, contents: Contents) -> list[str]:
                 reading.take(buffer, whole)
             except Damaged as err:
                 reading.damage.append(str(err))
-    return reading.notes(size)
+    return reading.notes()
 
 
 class _Reading:
@@ -63,13 +63,13 @@ class _Reading:
         self._undescribed = 0  # messages of channels that the file does not describe
         self.damage: list[str] = []  # what is wrong with each chunk that is left out
 
-    def notes(self, size: int) -> list[str]:
-        """What is to be said of a file of ``size`` bytes."""
+    def notes(self) -> list[str]:
+        """What is to be said of the file."""
         notes = []
         if self._cut_at is not None and not self._data_end:
             notes.append(
                 f"is truncated: it ends without its closing record; every whole message of its first "
-                f"{self._cut_at} bytes was read (of {size})"
+                f"{self._cut_at} bytes was read"
             )
         elif not self._closed:
             notes.append("has no end, for its index is cut off: all its messages were read")

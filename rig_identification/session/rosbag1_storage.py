@@ -42,7 +42,7 @@ def collect_rosbag1(path: Path, contents: Contents) -> list[str]:
         cut_at = reading.run(file, size)
     notes = []
     if cut_at is not None:
-        notes.append(f"is truncated: every whole message of its first {cut_at} bytes was read (of {size})")
+        notes.append(f"is truncated: every whole message of its first {cut_at} bytes was read")
     elif not reading.indexed:
         notes.append("was not closed by its recorder: it was read from beginning to end")
     if reading.damage:
