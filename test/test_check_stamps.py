@@ -236,7 +236,7 @@ def test_a_rate_that_only_copies_could_tell_is_not_told() -> None:
 def ordinary(seed: int) -> RawSession:
     """A session as devices give it: losses, gaps, jitter, parts, repeats, drift of 20 ppm, rounding."""
     rng = np.random.default_rng(seed)
-    raw = session(seed, (4.0, 7.0))
+    raw = session(seed, (2.5, 4.0))
     manners = {}
     for topic, (_, _, interval, _) in DEVICES.items():
         manners[topic] = (

@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 _ORDINARY_TOGETHER = 0.06
 #: Part of the deviations, the largest, whose sides are counted.
 _LARGEST = 0.2
+#: Samples at the end of a stream that may lie in the last block of an envelope.
+_TAIL = 128
 #: From this agreement of phases on, deviations are told apart from those by an interval more.
 _AGREEING = 0.1
 
@@ -65,6 +67,8 @@ def late(stream: Stream, tolerance: float) -> Late | None:
     turns, agreement = 0.0 * times, 1.0
     if interval is not None:
         turns = times / interval - np.arange(len(times))
+        # A loss among the last samples does not show in the envelope: they are not counted.
+        turns = turns[: -min(_TAIL, len(turns) // 2)]
     else:
         sought, agreement = rate_line(times)
         turns = _phases(times / sought)
@@ -125,14 +129,15 @@ def _one_sided(deviations: Array, rounding: float) -> float:
     """Nats for deviations from regular sampling (in intervals) that are late more often than early.
 
     Of the largest deviations about their middle, ordinary jitter has as many on either side, whatever its
-    law. Rounding moves the middle by up to half of its step. Deviations that last several samples count once.
+    law. Rounding moves the middle by half of its step at most, and either side by as much again. Deviations
+    that last several samples count once.
     """
     about = deviations - np.median(deviations)
     if np.std(about) == 0.0:
         return 0.0
     relation = float(np.clip(np.corrcoef(about[1:], about[:-1])[0, 1], 0.0, 0.999))
     independent = _LARGEST * len(about) * (1.0 - relation) / (1.0 + relation)
-    moved = (about + part * rounding for part in (-0.5, 0.0, 0.5))
+    moved = (about + part * rounding for part in (-1.0, 0.0, 1.0))
     return independent * min(_relative_entropy(_late_part(one), 0.5) for one in moved)
 
 
