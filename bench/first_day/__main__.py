@@ -99,8 +99,8 @@ def _recorded_tasks(options: argparse.Namespace) -> list[Task]:
 def _run(tasks: Sequence[Task], log: Path, jobs: int, minutes: float) -> list[dict[str, Any]]:
     """Entries of the tasks in their order; what the log has is not done again.
 
-    One of each kind of fault comes first, then another of each: what is done when the time is up is a sample of
-    all kinds, drawn by the tasks' names.
+    One of each kind of fault comes first, then another of each: what is done when the time is up is a sample
+    of all kinds, drawn by the tasks' names.
     """
     code = fingerprint()
     known: dict[str, dict[str, Any]] = {}
