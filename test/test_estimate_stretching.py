@@ -96,8 +96,8 @@ def test_a_run_on_six_cables_is_fitted_and_the_stretch_is_told_first() -> None:
     away = np.log(parameters.named(theta)[STIFFNESS] / 1.5e6)
     assert abs(away) < 3.5 * np.sqrt(covariance[stiff, stiff])
     total = inertial_estimate(fitted.problem, fitted.evaluation)
-    # A body that swings on parallel cables and is not shaken hardly pitches nor rolls
-    assert {"m", "cx", "cy", "Jzz"}.isdisjoint(total.unobservable)
+    # In four seconds, not shaken, it hardly turns: of its inertia next to nothing is known
+    assert {"m", "cx", "cy"}.isdisjoint(total.unobservable)
     known = np.array([name not in total.unobservable for name in ELEMENTS_BY_NAME])
     off = np.abs(total.values - ELEMENTS) / np.sqrt(np.diag(total.covariance))
     assert np.max(off[known]) < 3.5

@@ -18,10 +18,18 @@ from rig_identification.estimate.evidence import Run
 
 #: Length of all fitted runs together, and of all held-out ones, s.
 SECONDS = 250.0
+#: The same where the body is only seen to swing: about a minute, thirty to sixty periods, in most of which a
+#: free swing has died away. Each way to roll and each effect that damps is fitted to all of it.
+WATCHED_SECONDS = 64.0
+#: Devices that see how a body moves and not what moves it.
+ONLY_SEE = {"mocap", "inclinometer"}
 
 
-def enough(runs: tuple[Run, ...], most: float = SECONDS) -> tuple[Run, ...]:
-    """The runs with at most about ``most`` seconds in all."""
+def enough(runs: tuple[Run, ...], most: float | None = None) -> tuple[Run, ...]:
+    """The runs with at most about ``most`` seconds in all (none given: what the devices in them take)."""
+    if most is None:
+        seen = all(c.device in ONLY_SEE for run in runs for c in run.channels)
+        most = WATCHED_SECONDS if seen else SECONDS
     total = sum(run.grid.duration for run in runs)
     if total <= 1.01 * most:
         return runs

@@ -319,14 +319,19 @@ def without_unseen_force(session: Session, fitted: Fitted, chosen: Callable[[Run
     """
     if session.rig.exciter is None:
         return None
-    runs = (*fitted.problem.runs, *fitted.holdout_runs, *fitted.lost)
-    seen = (*fitted.evaluation.runs, *fitted.holdouts)
-    pairs = [(run, lin) for run, lin in zip(runs, seen, strict=True) if run.force is None and chosen(run)]
-    if not any(np.mean(linearised.residual**2) > HOPELESS_SQUARE for _, linearised in pairs):
+    fits = zip(fitted.problem.runs, fitted.evaluation.runs, strict=True)
+    held = zip(fitted.holdout_runs, fitted.holdouts, strict=True)
+    followed = [(run, float(np.mean(lin.residual**2))) for run, lin in (*fits, *held)]
+    unseen = [
+        (run, square)
+        for run, square in (*followed, *((run, np.inf) for run in fitted.lost))
+        if run.force is None and chosen(run)
+    ]
+    if not any(square > HOPELESS_SQUARE for _, square in unseen):
         return None
     # One that is driven bends the fit of all: no other without its force is to be trusted either
     names = [
-        r.name for r in (*session.training, *session.holdouts) if any(run.recording is r for run, _ in pairs)
+        r.name for r in (*session.training, *session.holdouts) if any(run.recording is r for run, _ in unseen)
     ]
     kept = tuple(r for r in session.recordings if r.name not in names)
     if all(r.kind == "dynamic" and r.holdout for r in kept):

@@ -13,10 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, left_to_go
+from rig_identification.model.definite import definite
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
@@ -29,9 +31,9 @@ SILENT = 1e3
 
 def elements_covariance(problem: Problem, evaluation: Evaluation) -> Array:
     """(10, 10) Laplace covariance of mass, centre of mass and inertia."""
-    covariance = invert_information(evaluation.information)[:10, :10]
     map_ = problem.bench.parameters.elements_jacobian(evaluation.point.theta)
-    return np.asarray(map_ @ covariance @ map_.T)
+    root = _root_of_inverse(evaluation.information)[:, :INERTIAL] @ map_.T
+    return np.asarray(root.T @ root)
 
 
 def unsettled(problem: Problem, evaluation: Evaluation) -> Array:
@@ -42,11 +44,16 @@ def unsettled(problem: Problem, evaluation: Evaluation) -> Array:
 
 
 def invert_information(information: Array) -> Array:
-    """Inverse of an information matrix, scaled to unit diagonal first."""
-    scale = 1.0 / np.sqrt(np.diag(information))
-    return np.asarray(
-        scale[:, None] * np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15) * scale
-    )
+    """Inverse of an information matrix: a covariance, with no variance below nothing."""
+    root = _root_of_inverse(information)
+    return np.asarray(root.T @ root)
+
+
+def _root_of_inverse(information: Array) -> Array:
+    """(n, n) W of which W^T W is the inverse of an information matrix, scaled to unit diagonal first."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+    factor = np.linalg.cholesky(definite(information * np.outer(scale, scale)))
+    return np.asarray(solve_triangular(factor, np.diag(scale), lower=True))
 
 
 def believed_std(problem: Problem) -> Array:

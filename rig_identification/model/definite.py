@@ -13,34 +13,38 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Factor by which more is added where a part does not do.
+#: Factor by which more is added where so much does not do.
 MORE = 10.0
 
 
 def definite(matrix: Array) -> Array:
-    """The symmetric ``matrix`` (n, n) itself where it has a Cholesky factor; else the nearest that is tried.
+    """The symmetric ``matrix`` (n, n) itself where its Cholesky factor says that it is; else one beside it.
 
-    Its diagonal is brought to one, and to that is added what rounding may have taken away, n times the
-    machine's precision, or as much more as it takes: Nocedal and Wright, "Numerical Optimization", 2006,
-    algorithm 3.3. What is not finite cannot be mended, and raises ``numpy.linalg.LinAlgError``.
+    Its diagonal is brought to one. Where a pivot then lies below what rounding may make of nothing, n times
+    the machine's precision, so much is added to the diagonal, or as much more as it takes: Nocedal and
+    Wright, "Numerical Optimization", 2006, algorithm 3.3. What is not finite cannot be mended, and raises
+    ``numpy.linalg.LinAlgError``.
     """
     if not np.all(np.isfinite(matrix)):
         raise np.linalg.LinAlgError("a matrix holds what is no number")
-    if _has_factor(matrix):
-        return matrix
     eps, tiny = np.finfo(float).eps, np.finfo(float).tiny
     diagonal = np.diag(matrix)
-    scale = np.sqrt(np.maximum(diagonal, max(float(np.max(diagonal)) * eps**2, np.sqrt(tiny))))
+    least = max(float(np.max(diagonal, initial=0.0)) * eps**2, np.sqrt(tiny))
+    scale = np.sqrt(np.maximum(diagonal, least))
     unit = 0.5 * (matrix + matrix.T) / np.outer(scale, scale)
-    added = float(unit.shape[0] * eps)
-    while not _has_factor(unit + added * np.eye(unit.shape[0])):
+    rounding = float(diagonal.size * eps)
+    if _is_above(rounding, unit):
+        return matrix
+    added = 2.0 * rounding
+    while not _is_above(rounding, unit + added * np.eye(diagonal.size)):
         added *= MORE
-    return np.asarray((unit + added * np.eye(unit.shape[0])) * np.outer(scale, scale))
+    return np.asarray((unit + added * np.eye(diagonal.size)) * np.outer(scale, scale))
 
 
-def _has_factor(matrix: Array) -> bool:
+def _is_above(least: float, matrix: Array) -> bool:
+    """Whether every pivot of a Cholesky factor lies above ``least``."""
     try:
-        np.linalg.cholesky(matrix)
+        factor = np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
         return False
-    return True
+    return bool(np.min(np.diag(factor) ** 2, initial=np.inf) > least)
