@@ -21,6 +21,8 @@ from rig_identification.check.readings.channel_model import (
     channels_of,
     groups,
     interval,
+    noise_std,
+    resolution,
 )
 from rig_identification.check.readings.moving_average import LEAST, Comb, candidates, comb, log_spectrum
 from rig_identification.check.readings.telling import (
@@ -43,6 +45,10 @@ _SHORTEST = 200
 #: Pieces of a recording: an average is in all of them. Two blows make a comb as well, in the piece that has
 #: both.
 _PIECES = 3
+#: Steps of the converter from which noise is more than rounding; of an average's noise little is left.
+_NOISY = 0.5
+#: A window is this share of a spectrum's length at most, so that each null has samples of it.
+_WIDEST = 3
 #: Share of the pieces in which an average must show.
 _SHOWS = 2.0 / 3.0
 #: Cycles of the motion in a window from which its second harmonic is damped threefold or more (sinc 0.7).
@@ -51,8 +57,8 @@ _LOST = 0.35
 _MOVES = 10.0
 #: An average over a whole number of samples in every recording and in all cells of a logger.
 _SAME = 0.02
-#: Quaternions are not averaged by components in any logger, and a simulated state has no noise.
-_AVERAGED = ("tension", "exciter_force", "imu", "inclination")
+#: Devices whose loggers average. A mean of quaternions that lie close together is the mean turn.
+_AVERAGED = ("tension", "exciter_force", "imu", "inclination", "mocap")
 
 
 def find(session: RawSession) -> tuple[Found, ...]:
@@ -77,7 +83,7 @@ def _spotted(recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:
         m: {
             number: [comb(log, m) for log in logs]
             for number, logs in spectra.items()
-            if logs and m <= len(logs[0]) // LEAST
+            if logs and m <= len(logs[0]) // _WIDEST
         }
         for m in windows
     }
@@ -109,6 +115,8 @@ def _spectra(channel: RawChannel) -> list[Array]:
     """One spectrum for every piece of every column that varies."""
     columns = [k for kept in groups(channel).values() for k in kept]
     filled = [_filled(channel.values[:, k]) for k in columns]
+    # Bends of a signal without noise make combs as well; rounding alone is 0.29 steps
+    filled = [column for column in filled if noise_std(column) > _NOISY * resolution(column)]
     return [log_spectrum(piece) for column in filled for piece in _pieces(column)]
 
 
@@ -128,12 +136,13 @@ def _filled(column: Array) -> Array:
 
 def _undone(channel: RawChannel, samples: int, combs: list[Comb]) -> RawChannel:
     values = np.array(channel.values)
+    floor = float(np.median([one.floor for one in combs]))
     for kept in groups(channel).values():
         for k in kept:
-            values[:, k] = undone(_filled(channel.values[:, k]), samples, max(c.floor for c in combs))
+            values[:, k] = undone(_filled(channel.values[:, k]), samples, floor)
     kept_ones = np.zeros(len(values), bool)
     # The first and the last window are poor; of the rest as many as rounding leaves white
-    kept_ones[samples : len(values) - samples : _stride(samples, max(c.floor for c in combs))] = True
+    kept_ones[samples : len(values) - samples : _stride(samples, floor)] = True
     values[~np.isfinite(channel.values)] = np.nan
     return only(
         RawChannel(

@@ -50,6 +50,8 @@ _POINT_MOVES = 0.005  # m
 _MOTION_STEPS = 20
 #: Devices that the body's motion must change.
 _MUST_MOVE = ("tension", "imu", "mocap")
+#: An inclinometer does not see a body that turns about the vertical; where tensions change, it tilts.
+_TILTS = ("inclination",)
 #: A message sent again once or twice does no harm and is no device that freezes.
 _RUN = 4
 #: Steps behind a run with which the step out of it is compared, and how much wider what was missed is: noise
@@ -174,7 +176,7 @@ def _stands_still(channel: RawChannel) -> bool:
     """Whether a channel that motion must change reads one value, not 0, in the whole recording."""
     values = channel.values[np.isfinite(channel.values).any(axis=1)]
     return (
-        channel.channel in _MUST_MOVE
+        channel.channel in (*_MUST_MOVE, *_TILTS)
         and len(values) >= _SHORTEST
         and not groups(channel)
         and bool(np.nanmax(np.abs(values)) > 0.0)
@@ -184,7 +186,8 @@ def _stands_still(channel: RawChannel) -> bool:
 def _moves(recording: RawRecording, still: RawChannel) -> bool:
     """Whether another device of the recording sees the body move."""
     for channel in recording.channels:
-        if channel.topic == still.topic or channel.channel not in _MUST_MOVE or not len(channel.values):
+        sees = ("tension",) if still.channel in _TILTS else _MUST_MOVE
+        if channel.topic == still.topic or channel.channel not in sees or not len(channel.values):
             continue
         columns = groups(channel)
         watched = {"tension": (0,), "imu": (0, 1, 2), "mocap": (0, 1, 2)}[channel.channel]

@@ -18,12 +18,11 @@ _ORDER = 3
 #: Fewer samples average nothing that matters: the delay is below an interval and a half.
 LEAST = 4
 #: A recording holds at least this many windows.
-_WINDOWS = 8
+_WINDOWS = 6
 #: A logarithm of a periodogram has this variance, and a Hann window makes 1.94 neighbours one.
 _VARIANCE = np.pi**2 / 6.0 * 1.94
-#: Cosines of the smooth factor beside the comb, and of a spectrum that is smooth alone: a filter of four
-#: poles.
-_BESIDE_COMB, _ALONE = 4, 9
+#: Cosines of the logarithm of a smooth spectrum, with and without the comb: four poles of a filter.
+_COSINES = 9
 #: Differences beyond this many medians, six std of noise, are no noise.
 _BLOW = 4.0
 #: Candidates of the window that are looked at closely.
@@ -77,11 +76,10 @@ def comb(log: Array, samples: int) -> Comb:
     """How much better an average over ``samples`` explains a spectrum than a smooth one does."""
     frequency = np.arange(1, len(log) + 1) / (2.0 * (len(log) + 1))
     response = squared_response(frequency, samples)
-    cosines = np.cos(2.0 * np.pi * frequency[:, None] * np.arange(_ALONE))
-    without = _left(log, cosines)
-    beside = cosines[:, :_BESIDE_COMB]
-    basis = np.linalg.qr(beside)[0]
-    left = [_left_of(log - np.log(response + floor), basis) for floor in _FLOORS]
+    cosines = np.cos(2.0 * np.pi * frequency[:, None] * np.arange(_COSINES))
+    basis = np.linalg.qr(cosines)[0]
+    without = _left(log, basis)
+    left = [_left(log - np.log(response + floor), basis) for floor in _FLOORS]
     best = int(np.argmin(left))
     gain = (without - left[best]) / (2.0 * _VARIANCE)
     return Comb(
@@ -94,11 +92,8 @@ def squared_response(frequency: Array, samples: int) -> Array:
     return np.asarray((np.sin(np.pi * frequency * samples) / (samples * np.sin(np.pi * frequency))) ** 2)
 
 
-def _left(log: Array, basis: Array) -> float:
-    return _left_of(log, np.linalg.qr(basis)[0])
-
-
-def _left_of(log: Array, orthogonal: Array) -> float:
+def _left(log: Array, orthogonal: Array) -> float:
+    """Squares of what the columns of ``orthogonal`` leave of a spectrum's logarithm."""
     return float(np.sum((log - orthogonal @ (orthogonal.T @ log)) ** 2))
 
 

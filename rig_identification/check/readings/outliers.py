@@ -19,6 +19,7 @@ from rig_identification.check.readings.channel_model import (
     seconds,
 )
 from rig_identification.raw import RawChannel
+from rig_identification.session.clipping import limits
 
 #: Samples of the running median behind which a smooth signal hides: three damaged ones leave it alone.
 _MEDIAN = 9
@@ -69,6 +70,10 @@ def outliers(channel: RawChannel, begun: int) -> Outliers:
     values = _continuous(channel)
     for k in [k for kept in groups(channel).values() for k in kept]:
         finite = np.isfinite(values[:, k])
+        # At an end of range noise is cut on one side: what comes down from there is no spike
+        there = np.flatnonzero(finite)
+        for end in limits(values[there, k : k + 1]):
+            finite[there[end.reached]] = False
         column = values[finite, k]
         if len(column) < _SMOOTH + _MEDIAN:
             continue
