@@ -21,6 +21,9 @@ def in_box(matrix: Array, right: Array, low: Array, high: Array) -> Array:
     least squares problems with nonnegative variables", 1994). It ends after a few rounds, or hardly ever does
     not; bounded-variable least squares then, which is certain and slow (Stark and Parker, 1995).
     """
+    if not right.size:
+        # Of a rig that is described without any tolerance nothing is in doubt
+        return np.zeros(0)
     side = np.zeros(right.size, dtype=np.int64)  # -1 at low, 1 at high
     scale = np.sqrt(np.diag(matrix))
     for _ in range(PIVOTS):

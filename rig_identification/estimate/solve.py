@@ -39,6 +39,8 @@ from rig_identification.model.motion import State, on_cables
 Array = NDArray[np.float64]
 
 
+#: Swings in which a body falls to rest from where it hung a step before: what takes it farther is no step.
+FALLS = 10
 #: Where an internal coordinate may start (m) and how fast (m/s): one standard deviation about its rest.
 INTERNAL_START = (0.1, 0.3)
 #: No entry of the log-Cholesky vector moves further in one step, in units of its weak prior's std.
@@ -143,7 +145,7 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
         rest = linearise_rest(bench, evidence, point.theta, guess)
         if rest is None:
             model = with_dummy(model_at(bench.parameters, point.theta), evidence.dummy)
-            rest = linearise_rest(bench, evidence, point.theta, settle(model, guess))
+            rest = linearise_rest(bench, evidence, point.theta, settle(model, guess, FALLS))
         if rest is None:
             return None
         rests.append(rest)

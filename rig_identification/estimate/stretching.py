@@ -36,6 +36,8 @@ STIFFNESSES = (0.1, 1.0, 10.0)
 #: Nats by which cables that stretch explain rest better, from which they do: of a rig with rigid cables
 #: chance brings two more numbers as much once in e^10 sessions (half a chi-square of two).
 GAINED = 10.0
+#: Mean square of what rest leaves below which no other stiffness is tried: so near the noise valleys are one.
+EXPLAINED = 2.0
 #: Share of its weak prior's std within which rest moves the body's height: hanging straight says little.
 HEIGHT = 0.15
 
@@ -90,7 +92,8 @@ def where_they_stretch(problem: Problem, theta: Array) -> Stretched | None:
         return None
     soft = with_stretch(problem, theta)
     rests = problem.rests or _means_of_runs(problem)
-    if soft is None or not rests:
+    if soft is None or not any(c.quantity == "tension" for rest in rests for c in rest.channels):
+        # Which cable carries what no other device feels
         return None
     rigid, elastic = _at_rest(problem, theta, rests), _softest(soft, rests)
     if elastic is None:
@@ -130,7 +133,14 @@ def _softest(soft: Stretched, rests: tuple[RestEvidence, ...]) -> Evaluation | N
         found = _at_rest(soft.problem, theta, rests)
         if found is not None and (best is None or found.cost < best.cost):
             best = found
+        if best is not None and _square(best) < EXPLAINED:
+            break
     return best
+
+
+def _square(evaluation: Evaluation) -> float:
+    """Mean square of what rest leaves."""
+    return float(np.mean(np.concatenate([rest.residual for rest in evaluation.rests]) ** 2))
 
 
 def _at_rest(problem: Problem, theta: Array, rests: tuple[RestEvidence, ...]) -> Evaluation | None:
