@@ -26,7 +26,7 @@ from rig_identification.nodes.session_folder import DiskFull, RecordingPlan, Ses
 from rig_identification.rig import Cable, Mount, Rig
 from rig_identification.session import read_session
 from rig_identification.session.messages import serialize
-from rig_identification.session.topics import Topic, expected_topics
+from rig_identification.topics import Topic, expected_topics
 
 START = 1_790_000_000 * SECOND
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from session_samples import edit_yaml, make_recording, rewrite, shift_stamp, stamped, write_single
 
+from rig_identification.cleaning.clipping import clipped_samples, limits
+from rig_identification.cleaning.stamps import select_stamps
 from rig_identification.recording import ChannelQuality, Recording, Series
 from rig_identification.session import read_session
-from rig_identification.session.clipping import clipped_samples, limits
-from rig_identification.session.stamps import select_stamps
 
 IMU = "/rig/imu/data_raw"
 CABLE = "/rig/cable_1/wrench"

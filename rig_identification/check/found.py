@@ -24,7 +24,7 @@ class Found:
 
 
 class Examiner(Protocol):
-    """A module of ``check/stamps`` or ``check/readings``: one kind of fault that a channel shows by itself."""
+    """A module of ``check/stamps`` or ``check/readings``: one kind of fault, found without a model."""
 
     ORDER: int  # examiners run by rising order, each on the session that those before it corrected
 

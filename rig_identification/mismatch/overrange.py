@@ -1,7 +1,7 @@
 """Sensors at the end of their range: what they read there is left out, and said.
 
 No physics of the rig explains such samples and none has to: they are the sensor's limit, exactly, many times
-in a row (session/clipping.py). The contract's table has no word for that, so the finding is ``unknown``
+in a row (cleaning/clipping.py). The contract's table has no word for that, so the finding is ``unknown``
 with its device, quantity, axis, times and limit.
 """
 

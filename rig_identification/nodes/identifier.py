@@ -26,7 +26,7 @@ from rig_identification.nodes.running import RunningEstimator
 from rig_identification.nodes.session_folder import SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
 from rig_identification.session.session_description import read_session_description
-from rig_identification.session.topics import expected_topics
+from rig_identification.topics import expected_topics
 
 PARAMETERS = (
     OwnParameter(

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from rclpy.clock import ROSClock
 
+from rig_identification.cleaning.clipping import clipped_samples
 from rig_identification.errors import InputError
 from rig_identification.live.sending_clock import SendingClock
 from rig_identification.live.stamp_gate import StampGate
 from rig_identification.nodes.by_hand import Taken
 from rig_identification.nodes.rig_node import RigNode, reliable
 from rig_identification.nodes.wire import TYPES, channel_values, decode_batch
-from rig_identification.session.clipping import clipped_samples
-from rig_identification.session.topics import Topic
+from rig_identification.topics import Topic
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

@@ -18,7 +18,7 @@ from rig_identification.nodes.odometry_wire import read_odometry
 from rig_identification.nodes.parameters import OwnParameter, within
 from rig_identification.nodes.rig_node import LATCHED, OK, WARN, RigNode, diagnostic, reliable
 from rig_identification.nodes.wire import Array, StampedDoubles, Stamps
-from rig_identification.session.topics import expected_topics
+from rig_identification.topics import expected_topics
 
 PARAMETERS = (
     OwnParameter(

@@ -15,7 +15,7 @@ from rig_identification.nodes.recording_parameters import RECORDING, planned
 from rig_identification.nodes.rig_node import ERROR, OK, RigNode, diagnostic
 from rig_identification.nodes.session_folder import SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
-from rig_identification.session.topics import expected_topics
+from rig_identification.topics import expected_topics
 
 PARAMETERS = (
     OwnParameter("folder", "session", "the session's folder; it must be new"),

@@ -26,7 +26,7 @@ from rig_identification.nodes.wire import TYPES
 from rig_identification.session.bag import Bag, read_bag
 from rig_identification.session.rig_description import read_rig
 from rig_identification.session.session_description import BagEntry, read_session_description
-from rig_identification.session.topics import DEFAULT_NAMESPACE, expected_topics
+from rig_identification.topics import DEFAULT_NAMESPACE, expected_topics
 
 PARAMETERS = (
     OwnParameter("session", "", "folder of the session, or its session.yaml"),

@@ -22,7 +22,7 @@ from rig_identification.nodes.plant_message import TOPIC, to_message
 from rig_identification.nodes.rig_node import OK, WARN, RigNode, diagnostic, reliable
 from rig_identification.recording import Dummy
 from rig_identification.session.messages import serialize
-from rig_identification.session.topics import expected_topics
+from rig_identification.topics import expected_topics
 
 #: Effects that the plant can have; those of the devices are the sensor nodes' own parameters.
 EFFECTS = tuple(

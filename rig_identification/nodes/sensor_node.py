@@ -20,7 +20,7 @@ from rig_identification.nodes.sources import DeviceErrors, FileSource, SerialSou
 from rig_identification.nodes.wire import TYPES
 from rig_identification.rig import Rig
 from rig_identification.session.messages import serialize
-from rig_identification.session.topics import Topic, expected_topics
+from rig_identification.topics import Topic, expected_topics
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from rig_identification.recording import Dummy
 from rig_identification.rig import Rig
 from rig_identification.session.messages import TYPESTORE
 from rig_identification.session.rig_document import rig_document
-from rig_identification.session.topics import Topic
+from rig_identification.topics import Topic
 
 PLUGINS = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 #: Bytes kept free to close a bag: the writer's open chunk of 1 MiB, its index and session.yaml.

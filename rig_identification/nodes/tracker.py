@@ -18,7 +18,7 @@ from rig_identification.nodes.markers import rig_markers
 from rig_identification.nodes.odometry_wire import OdometryWriter
 from rig_identification.nodes.parameters import OwnParameter, within
 from rig_identification.nodes.rig_node import ERROR, OK, WARN, RigNode, diagnostic, reliable
-from rig_identification.session.topics import expected_topics
+from rig_identification.topics import expected_topics
 
 PARAMETERS = (
     OwnParameter("integrate_only", False, "plain integration of the IMU from rest: nothing holds it"),

@@ -14,7 +14,7 @@ from sensor_msgs.msg import Imu, JointState
 
 from rig_identification.session.cdr import decode
 from rig_identification.session.raw_topic import Collector
-from rig_identification.session.topics import Topic
+from rig_identification.topics import Topic
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

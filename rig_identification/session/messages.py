@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
 from rig_identification.recording import Array
-from rig_identification.session.topics import Topic
+from rig_identification.topics import Topic
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 _DEVICE_FRAMES = {

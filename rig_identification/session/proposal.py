@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
+from rig_identification.cleaning.rest import first_motion
 from rig_identification.errors import InputError
 from rig_identification.recording import Recording
 from rig_identification.rig import Cable, Mount, Rig
 from rig_identification.session.bag import read_bag
 from rig_identification.session.not_a_session import FILE, bags_in
-from rig_identification.session.rest import first_motion
 from rig_identification.session.rig_description import read_rig
-from rig_identification.session.topics import foreign_cable
+from rig_identification.topics import foreign_cable
 
 #: Reads and cleans one bag as a dynamic run of a rig.
 ReadRun = Callable[[Path, Rig], Recording]

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from rig_identification.cleaning import clean
 from rig_identification.errors import MissingDescription
 from rig_identification.raw import RawRecording, RawSession
 from rig_identification.recording import Recording, Session
 from rig_identification.rig import Rig
 from rig_identification.session.bag import read_bag
 from rig_identification.session.channel import raw_channel
-from rig_identification.session.cleaning import clean
 from rig_identification.session.not_a_session import FILE
 from rig_identification.session.proposal import propose
 from rig_identification.session.rig_description import read_rig
@@ -24,7 +24,7 @@ from rig_identification.session.session_description import (
     SessionDescription,
     read_session_description,
 )
-from rig_identification.session.topics import DEFAULT_NAMESPACE, Topic, check_mapped, expected_topics
+from rig_identification.topics import DEFAULT_NAMESPACE, Topic, check_mapped, expected_topics
 
 Progress = Callable[[str], None]
 

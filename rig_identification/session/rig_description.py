@@ -10,7 +10,7 @@ import numpy as np
 from rig_identification.errors import InputError, did_you_mean
 from rig_identification.rig import DEFAULT_TOLERANCE, NOISE_NAMES, Cable, CarryingFrame, Mount, Rig
 from rig_identification.session.fields import Fields, load_fields
-from rig_identification.session.topics import DEVICES
+from rig_identification.topics import DEVICES
 
 #: No rig of this kind is larger; a value beyond is in mm.
 LARGEST_LENGTH = 100.0  # m

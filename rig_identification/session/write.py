@@ -18,7 +18,7 @@ from rig_identification.errors import InputError
 from rig_identification.recording import Recording, Series, Session
 from rig_identification.session.messages import TYPESTORE, serialize
 from rig_identification.session.rig_document import rig_document
-from rig_identification.session.topics import DEFAULT_NAMESPACE, Topic, expected_topics
+from rig_identification.topics import DEFAULT_NAMESPACE, Topic, expected_topics
 
 _BAG_VERSION: Literal[9] = 9
 _LATENCY = 2_000_000  # ns from measurement to receipt, before jitter

@@ -68,7 +68,7 @@ class Evidence:
         return self.plain.cost - self.without(devices).cost
 
     def judged(self, hypothesis: Hypothesis, thorough: bool = False) -> Account:
-        """The session under a hypothesis; not thorough: to first order about the session without its devices."""
+        """The session under a hypothesis; unless thorough, to first order about it without its devices."""
         changed = hypothesis.change.reduced(self.session)
         fresh = thorough or hypothesis.fresh
         start = None if fresh else self.without(hypothesis.about)
@@ -108,8 +108,8 @@ class Evidence:
     ) -> Account:
         """Evaluate a session from scratch.
 
-        begun: another account, from whose motions a fit is tried as well; moved: whether the motion may differ
-        from those at all.
+        begun: another account, from whose motions a fit is tried as well. moved: whether the motion may
+        differ from those at all.
         """
         rest = fit_rest(session.rig, session.at_rest, loosened)
         if rest is None:
@@ -119,7 +119,9 @@ class Evidence:
         parts = {"rest": self._rest_nats(rest.square)}
         motions = []
         for k, run in enumerate(session.runs[:RUNS]):
-            motion = _motion(session.rig, run, rest, begun.motions[k] if begun and begun.motions else None, moved)
+            motion = _motion(
+                session.rig, run, rest, begun.motions[k] if begun and begun.motions else None, moved
+            )
             motions.append(motion)
             parts |= _parts(session.rig, run, rest, motion)
         return Account(rest, tuple(motions), float(sum(parts.values())), parts)

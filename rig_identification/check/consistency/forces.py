@@ -20,8 +20,8 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.motion import ACROSS, ORDINARY, TINY, Trajectory, nats
 from rig_identification.check.consistency.rest import SCALE, RestFit
-from rig_identification.statics.balance import skew
 from rig_identification.rig import Rig
+from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class ForceModel:
         mount = self.rig.exciter
         assert mount is not None
         turn = Rotation.from_quat(mount.orientation).as_matrix()
-        return np.concatenate([turn, skew(mount.position) @ turn]).T
+        return np.asarray(np.concatenate([turn, skew(mount.position) @ turn]).T)
 
     def _judged(self, wrench: Array, inertial: Array, pull: Array) -> tuple[float, Array]:
         spread = np.std(pull, axis=0)
@@ -125,7 +125,7 @@ def _guess(rig: Rig, hinges: Array, rest: RestFit) -> tuple[Array, Array]:
     mass, mass_std = rest.mass, rest.mass * np.hypot(SCALE, float(rest.value("mass")[1][0]))
     inertia = mass * (GYRATION * span) ** 2
     c = center
-    about = mass * np.array([c[1] ** 2 + c[2] ** 2, -c[0] * c[1], -c[0] * c[2], c[0] ** 2 + c[2] ** 2, -c[1] * c[2], c[0] ** 2 + c[1] ** 2])  # fmt: skip
+    about = mass * (c @ c * np.eye(3) - np.outer(c, c))[np.triu_indices(3)]
     guess = np.concatenate(
         [[mass], mass * c, np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0]) * 2.0 * inertia + about]
     )

@@ -17,7 +17,7 @@ from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Readings (N, width) of one device to what they should have been. The second argument is the recording's name.
+#: Readings (N, width) of one device to what they should have been; the second argument names the recording.
 Reading = Callable[[Array, str], Array]
 
 
@@ -80,13 +80,15 @@ class Change:
         by_cable = {c.cable: c for c in recording.channels if c.cable}
         for channel in recording.channels:
             one: RawChannel | None = channel
-            if channel.cable in self.wires:
-                source = by_cable.get(self.wires[channel.cable])
+            cable = channel.cable or ""
+            if cable in self.wires:
+                source = by_cable.get(self.wires[cable])
                 one = None if source is None else replace(source, topic=channel.topic, cable=channel.cable)
             if one is None or one.device in self.left_out:
                 continue
-            if self.less.get(one.cable):
-                one = replace(one, values=_without(one, [by_cable[o] for o in self.less[one.cable]]))
+            others = [by_cable[o] for o in self.less.get(cable, ()) if o in by_cable]
+            if others:
+                one = replace(one, values=_without(one, others))
             if one.device in self.readings and one.channel != "exciter_shaft":
                 one = replace(one, values=self.readings[one.device](one.values, recording.name))
             channels.append(one)
@@ -99,7 +101,7 @@ class Change:
 def _without(total: RawChannel, others: list[RawChannel]) -> Array:
     """(n, 1) a channel's readings less those of others, taken at its stamps."""
     stamp = total.stamp_ns.astype(float)
-    out = total.values.copy()
+    out: Array = np.array(total.values)
     for other in others:
         order = np.argsort(other.stamp_ns, kind="stable")
         out[:, 0] -= np.interp(stamp, other.stamp_ns[order].astype(float), other.values[order, 0])

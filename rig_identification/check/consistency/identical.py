@@ -75,8 +75,8 @@ def _recordings(session: RawSession) -> Iterator[Found]:
             {"channel": "session", "kind": "same_recording", "recordings": [one.name, other.name]},
             {},
             f"{one.name} and {other.name} are the same recording.",
-            f"Give each run its own bag in session.yaml. {drop.name} is left out: {kept.name} cannot be fitted twice"
-            + (", nor held out from itself." if one.holdout != other.holdout else "."),
+            f"Give each run its own bag in session.yaml. {drop.name} is left out: {kept.name} cannot be "
+            "fitted twice" + (", nor held out from itself." if one.holdout != other.holdout else "."),
         )
         yield Found(replace(told, gain=float("inf")), session)
 

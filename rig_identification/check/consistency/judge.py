@@ -1,8 +1,8 @@
 """The decision: which hypothesis about the set-up, if any, makes the session hang together.
 
-One at a time: the best hypothesis is accepted if it gains more nats than its price, its readings are put right,
-and the rest is asked again. The price is the same for all: the prior odds of any one fault, the size
-of its family, and what its free numbers cost.
+One at a time: the best hypothesis is accepted if it gains more nats than its price, its readings are put
+right, and the rest is asked again. The price is the same for all: the prior odds of any one fault, the
+size of its family, and what its free numbers cost.
 """
 
 from __future__ import annotations

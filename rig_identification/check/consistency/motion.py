@@ -26,13 +26,13 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.reduced import PER_SPAN, Reduced
 from rig_identification.check.consistency.rest import BIAS, DOUBT, LENGTH, TILT
-from rig_identification.statics.balance import skew
 from rig_identification.rig import Rig
+from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 
-#: Share of a reading's variation that ordinary errors and left-out physics leave unexplained, and share of the
-#: whole device's that axes turned by a few hundredths of a radian bring over from the others.
+#: Share of a reading's variation that ordinary errors and left-out physics leave unexplained, and share of
+#: the whole device's that axes turned by a few hundredths of a radian bring over from the others.
 ORDINARY, ACROSS = 0.15, 0.05
 #: Spread of a reading that never changes, so that its logarithm exists.
 TINY = 1e-9
@@ -93,7 +93,7 @@ class Trajectory:
     def proper_acceleration(self, gravity: float) -> Array:
         """(N, 3) m/s^2: specific force at the body's datum, body axes."""
         total = self.acceleration + np.array([0.0, 0.0, gravity])
-        return np.einsum("nji,nj->ni", self.R, total)
+        return np.asarray(np.einsum("nji,nj->ni", self.R, total))
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class MotionFit:
 
 @dataclass(frozen=True)
 class _Block:
-    """Readings of one kind about a trajectory: measured less predicted, and slopes by pose, velocity, change."""
+    """Readings of one kind about a trajectory: what is missed, and slopes by pose, velocity, acceleration."""
 
     name: str
     miss: Array  # (N, w), NaN where not measured
@@ -315,8 +315,8 @@ class MotionModel:
 class _Spline:
     """Cubic B-spline of six numbers over a run's evenly spaced instants, and its least squares.
 
-    Each span between two knots holds ``PER_SPAN`` instants, so that what one span adds to the normal equations
-    is one product of matrices.
+    Each span between two knots holds ``PER_SPAN`` instants, so that what one span adds to the normal
+    equations is one product of matrices.
     """
 
     def __init__(self, instants: int, step: float, away: Array) -> None:

@@ -1,4 +1,4 @@
-"""Recordings reduced to what a consistency test needs: means at rest, and motion alike smoothed in every channel.
+"""Recordings reduced to what a consistency test needs: medians at rest, and motion smoothed alike everywhere.
 
 Channels of a run are smoothed by one Gaussian kernel and taken at common instants. The same linear
 filter in every channel keeps each linear relation between channels; noise and ringing above it go.
@@ -25,7 +25,7 @@ WINDOW = 12.0
 NARROWEST, WIDEST = 0.02, 0.1
 #: Channels that take part; a shaft and a simulation's truth do not.
 CHANNELS = ("tension", "exciter_force", "imu", "inclination", "mocap")
-#: Instants come in such groups, one a span of the motion's spline (motion.py); fewer than these are no motion.
+#: Instants come in such groups, one a span of the motion's spline; fewer than these are no motion.
 PER_SPAN, FEWEST = 3, 21
 #: A gap of more kernels than this holds no information.
 GAP = 4.0
@@ -72,7 +72,7 @@ class ReducedSession:
 
 
 def reduced(session: RawSession) -> ReducedSession:
-    """Reduce every recording. Channels whose stamps lie elsewhere, or that hold no number, do not take part."""
+    """Reduce every recording. Channels with stamps elsewhere, or without a number, do not take part."""
     recordings = (_recording(recording) for recording in session.recordings)
     return ReducedSession(session.rig, tuple(r for r in recordings if r is not None))
 
@@ -106,9 +106,15 @@ def _at_rest(raw: RawRecording, channels: list[RawChannel], start: float) -> Red
         rows = channel.values
         if channel.channel == "mocap":
             rows = _continuous(rows)
-        values[channel.device] = np.ma.median(np.ma.masked_invalid(rows), axis=0).filled(np.nan)[None]
+        values[channel.device] = _median(rows)
     one = np.zeros(1)
     return Reduced(raw.name, raw.kind, raw.holdout, raw.dummy, one, 0.0, values, int(start))
+
+
+def _median(rows: Array) -> Array:
+    """(1, w) medians of what is measured, NaN where nothing is."""
+    known = [column[np.isfinite(column)] for column in rows.T]
+    return np.array([[np.median(column) if column.size else np.nan for column in known]])
 
 
 def _in_motion(raw: RawRecording, channels: list[RawChannel], start: float) -> Reduced | None:
@@ -136,7 +142,7 @@ def _in_motion(raw: RawRecording, channels: list[RawChannel], start: float) -> R
 
 
 def _window(series: Mapping[str, tuple[Array, Array]], start: float) -> tuple[float, float]:
-    """Begin and end (s) of the stretch in which readings vary most, each in units of its own whole variation."""
+    """Begin and end (s) of the stretch in which readings vary most, each over its own whole variance."""
     begins = sorted((t[0] - start) * 1e-9 for t, _ in series.values())
     ends = sorted((t[-1] - start) * 1e-9 for t, _ in series.values())
     begin, end = begins[len(begins) // 2], ends[len(ends) // 2]
@@ -196,7 +202,7 @@ def _mean_of(run: Reduced) -> Reduced:
 
 def _mean(rows: Array) -> Array:
     """(1, w) means of what is measured, NaN where nothing is."""
-    return np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan)[None]
+    return np.asarray(np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan))[None]
 
 
 def _variance(rows: Array) -> Array:

@@ -1,4 +1,4 @@
-"""How well readings at rest agree with the description: the balance of chapter 2 with ordinary doubts enlarged.
+"""How well readings at rest agree with the description: the balance of chapter 2 with enlarged doubts.
 
 Unknown are the centre of mass and the mass, each recording's pose and tensions, and what rig and
 sensors may ordinarily be off by: gains, zeros, lengths, the angles' zero and the accelerometer's

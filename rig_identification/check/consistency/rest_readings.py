@@ -13,8 +13,10 @@ from rig_identification.rig import Rig
 
 
 def readings_at_rest(evidence: Evidence) -> tuple[RestReading, ...]:
-    """Every tension, angle and component of specific force; what is expected is the described rig with the body
-    that agrees with all of them best."""
+    """Every tension, angle and component of specific force.
+
+    What is expected is the described rig with the body that agrees with all of them best.
+    """
     rest = evidence.plain.rest
     if rest is None:
         return ()
@@ -35,7 +37,7 @@ def readings_at_rest(evidence: Evidence) -> tuple[RestReading, ...]:
 
 
 def _described(rig: Rig, recording: Reduced) -> Iterator[tuple[str, int, str, str | None, str, float]]:
-    """Device, column, quantity, axis, unit and what the description lets it be off by (a share for tensions)."""
+    """Device, column, quantity, axis, unit, and what it may be off by (a share for tensions)."""
     tolerance = rig.tolerance
     for cable in rig.cables:
         if cable.name in recording.values:

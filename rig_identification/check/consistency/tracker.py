@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.motion import ACROSS, INDEPENDENT, ORDINARY, TINY, Trajectory, nats
 from rig_identification.rig import Rig
+from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ class TrackerModel:
 
     def cost(self, poses: Array) -> float:
         """Nats by which poses (N, 7) disagree."""
-        known = np.isfinite(poses).all(axis=1)
+        known = np.asarray(np.isfinite(poses).all(axis=1))
         if np.count_nonzero(known) < 20:
             return 0.0
         poses = poses[known]
@@ -72,7 +73,10 @@ class TrackerModel:
             return [(middle * marker.inv() * Rotation.from_matrix(self.R0).inv()).as_matrix()]
         headings = 2.0 * np.pi * np.arange(HEADINGS) / HEADINGS
         if w is None:
-            ups = [Rotation.identity(), *(Rotation.from_rotvec(0.5 * np.pi * s * a) for a in np.eye(3)[:2] for s in (1, -1))]
+            ups = [
+                Rotation.identity(),
+                *(Rotation.from_rotvec(0.5 * np.pi * s * a) for a in np.eye(3)[:2] for s in (1, -1)),
+            ]
             ups.append(Rotation.from_rotvec([np.pi, 0.0, 0.0]))
             return [(up * Rotation.from_rotvec([0, 0, h])).as_matrix() for up in ups for h in headings]
         left, _, right = np.linalg.svd(q.T @ w)
@@ -83,7 +87,7 @@ class TrackerModel:
     def _by_motion(self, d: Array, q: Array, x: Array, w: Array, R: Array) -> float:
         """Nats for one attitude, the marker's arm fitted."""
         moved = d @ R
-        arm = self._arm(moved - x, np.swapaxes(_cross(w), 1, 2))
+        arm = self._arm_of(skew(w).reshape(-1, 3), (moved - x).reshape(-1))
         left = np.concatenate([moved - x - np.cross(w, arm), q @ R - w], axis=1)
         spread = np.concatenate([np.std(d @ R, axis=0), np.std(q @ R, axis=0)])
         return self._nats(left, spread) + self._tilt(R)
@@ -100,11 +104,6 @@ class TrackerModel:
         left = stretch - rows @ arm
         whole = float(np.sqrt(np.mean(moved**2) + np.mean(turn**2) * np.mean(hinges**2)))
         return self._nats(left, np.full(unit.shape[0], whole)) + self._tilt(R)
-
-    def _arm(self, miss: Array, by_turn: Array) -> Array:
-        """(3,) m, world axes: w x m explains ``miss`` best."""
-        rows = -np.swapaxes(by_turn, 1, 2)
-        return self._arm_of(rows.reshape(-1, 3), miss.reshape(-1))
 
     def _arm_of(self, rows: Array, miss: Array) -> Array:
         span = max(float(np.ptp([c.body_point for c in self.rig.cables], axis=0).max()), 0.1)
@@ -126,10 +125,3 @@ class TrackerModel:
         """Nats by which a tracker's z axis is not up."""
         tilt = float(np.arccos(np.clip(R[2, 2], -1.0, 1.0)))
         return 0.5 * INDEPENDENT * float(np.log1p((tilt / LEVEL) ** 2))
-
-
-def _cross(v: Array) -> Array:
-    """(N, 3, 3) matrices of the cross product with v."""
-    x, y, z = v.T
-    zero = np.zeros_like(x)
-    return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)

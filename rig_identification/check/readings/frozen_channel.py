@@ -35,9 +35,9 @@ from rig_identification.check.readings.telling import (
     where,
     without,
 )
+from rig_identification.cleaning.clipping import limits
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
-from rig_identification.session.clipping import limits
 
 ORDER = 30
 #: A body moves where a tension changes by this share, ...

@@ -18,8 +18,8 @@ from rig_identification.check.readings.channel_model import (
     runs,
     seconds,
 )
+from rig_identification.cleaning.clipping import limits
 from rig_identification.raw import RawChannel
-from rig_identification.session.clipping import limits
 
 #: Samples of the running median behind which a smooth signal hides: three damaged ones leave it alone.
 _MEDIAN = 9

@@ -1,6 +1,6 @@
 """Readings at the end of a sensor's range.
 
-Cleaning leaves such samples out, and those within reach of the limit (``session/clipping.py``); here they
+Cleaning leaves such samples out, and those within reach of the limit (``cleaning/clipping.py``); here they
 are told. The samples stay, so that cleaning sees the limit. A recording that lies at a limit all along does
 not show it by itself: it is left out here, where another recording shows the limit.
 """
@@ -14,11 +14,11 @@ import numpy as np
 from rig_identification.check.found import Found
 from rig_identification.check.readings.channel_model import channels_of, seconds
 from rig_identification.check.readings.telling import start_ns, without
+from rig_identification.cleaning.channel import clean_channel
 from rig_identification.errors import InputError
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawSession
 from rig_identification.recording import Overrange
-from rig_identification.session.channel import clean_channel
 
 ORDER = 40
 #: A single sample that noise of the limit's run makes has one nat at least.

@@ -1,1 +1,1 @@
-"""Hypotheses about a session's set-up, one kind a file: each yields what its change would be and its words."""
+"""Hypotheses about a session's set-up, one kind a file: what each would change, and its words."""

@@ -1,4 +1,4 @@
-"""Axes of an IMU or an inclinometer that are exchanged or reversed: every signed permutation, left-handed ones too."""
+"""Axes of an IMU or an inclinometer that are exchanged or reversed, left-handed ones too."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from rig_identification.rig import Rig
 Array = NDArray[np.float64]
 
 #: Which half of an IMU: columns, and the word for its readings.
-HALVES = {
-    "imu": (("imu",), "The IMU's axes"),
+HALVES: dict[str, tuple[tuple[slice, ...], str]] = {
+    "imu": ((slice(0, 3), slice(3, 6)), "The IMU's axes"),
     "imu.gyroscope": ((slice(0, 3),), "The gyroscope's axes"),
     "imu.accelerometer": ((slice(3, 6),), "The accelerometer's axes"),
 }
-#: Cosine between measured and expected direction of gravity below which a permutation is not tried any further:
-#: half of the 90 degrees by which another permutation misses.
+#: Cosine between measured and expected direction of gravity below which a permutation is not tried: half
+#: of the 90 degrees by which another permutation misses.
 ALIGNED = 0.7
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """Signed permutations of the IMU as a whole, of its gyroscope, of its accelerometer, of the inclinometer."""
+    """Signed permutations of the IMU, of each half of it, and of the inclinometer."""
     rig = evidence.session.rig
     if rig.imu is not None:
         for half in HALVES:
@@ -42,7 +42,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
 
 
 def signed_permutations(size: int) -> list[Array]:
-    """Every matrix with one entry of 1 or -1 in each row and column but the identity, fewest changes first."""
+    """Every matrix with one 1 or -1 in each row and column but the identity, fewest changes first."""
     out = []
     for order in permutations(range(size)):
         for signs in product((1.0, -1.0), repeat=size):
@@ -68,10 +68,10 @@ def _upright(evidence: Evidence, turn: Array) -> bool:
 
 
 def _imu(rig: Rig, half: str, turn: Array) -> Hypothesis:
-    columns = [slice(0, 3), slice(3, 6)] if half == "imu" else list(HALVES[half][0])
+    columns = HALVES[half][0]
 
     def right(values: Array, _: str) -> Array:
-        out = values.copy()
+        out: Array = np.array(values)
         for part in columns:
             out[:, part] = values[:, part] @ turn.T
         return out

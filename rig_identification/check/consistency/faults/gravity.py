@@ -43,7 +43,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
         missing[run.name] = rig.gravity * motion.trajectory.R[:, 2] @ R_imu
 
     def right(values: Array, name: str) -> Array:
-        out = values.copy()
+        out: Array = np.array(values)
         add = missing.get(name)
         if add is not None and len(add) in (1, len(out)):
             out[:, 3:] += add
@@ -54,7 +54,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
             "axes",
             {"channel": "imu", "part": "accelerometer", "kind": "gravity_removed"},
             {},
-            "The accelerometer reads about 0 at rest: the driver has taken gravity out of the specific force.",
+            "The accelerometer reads about 0 at rest: the driver has taken gravity out of its readings.",
             "Publish the raw specific force, +9.81 m/s^2 upwards at rest. Until then it is left out: gravity "
             "was taken out by an attitude that the driver guessed.",
             corrected=False,
@@ -66,7 +66,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
 
 
 def _silent(values: Array, name: str) -> Array:
-    out = values.copy()
+    out: Array = np.array(values)
     out[:, 3:] = np.where(np.isfinite(out[:, 3:]), 0.0, np.nan)
     return out
 

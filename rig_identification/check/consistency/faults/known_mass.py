@@ -1,4 +1,4 @@
-"""The known mass of a static recording: of another recording, in pounds, heavier or elsewhere than written."""
+"""The known mass of a static recording: another recording's, in pounds, heavier or elsewhere."""
 
 from __future__ import annotations
 

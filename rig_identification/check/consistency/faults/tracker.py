@@ -39,7 +39,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
 
 
 def _turned(poses: Array, quaternions: Array) -> Array:
-    out = poses.copy()
+    out: Array = np.array(poses)
     out[:, 3:] = quaternions
     return out
 
@@ -58,7 +58,9 @@ def _unit(unit: str, factor: float) -> Hypothesis:
     return Hypothesis(change, describe, ABOUT, variants=len(LENGTHS))
 
 
-def _one(kind: str, right: Callable[[Array], Array], variants: int, statement: str, advice: str) -> Hypothesis:
+def _one(
+    kind: str, right: Callable[[Array], Array], variants: int, statement: str, advice: str
+) -> Hypothesis:
     def describe(rest: RestFit | None) -> SetupFault:
         return fault("axes", {"channel": "mocap", "kind": kind}, {}, statement, advice)
 
@@ -70,17 +72,23 @@ def _axes(turn: Array) -> Hypothesis:
     sense = float(np.linalg.det(turn))
 
     def right(poses: Array, _: str) -> Array:
-        out = poses.copy()
+        out: Array = np.array(poses)
         out[:, :3] = poses[:, :3] @ turn.T
         out[:, 3:6] = sense * poses[:, 3:6] @ turn.T
         return out
 
     def describe(rest: RestFit | None) -> SetupFault:
         names = ", ".join(f"{axis} = {source}" for axis, source in zip("xyz", written(turn), strict=True))
-        handed = "mirrored: its frame is left-handed" if sense < 0.0 else "turned: its z axis does not point up"
+        handed = (
+            "mirrored: its frame is left-handed" if sense < 0.0 else "turned: its z axis does not point up"
+        )
         return fault(
             "axes",
-            {"channel": "mocap", "kind": "mirrored" if sense < 0.0 else "turned", "permutation": written(turn)},
+            {
+                "channel": "mocap",
+                "kind": "mirrored" if sense < 0.0 else "turned",
+                "permutation": written(turn),
+            },
             {},
             f"The tracker's frame is {handed}.",
             f"Publish {names} of what is published now, and turn the quaternions likewise.",

@@ -51,9 +51,9 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
         yield _description(unit, factor)
         if evidence.session.rig.imu is not None:
             yield _imu_position(unit, factor)
-        longest = max(c.length for c in evidence.session.rig.cables)
+        others = float(np.median([c.length for c in evidence.session.rig.cables]))
         for cable in evidence.session.rig.cables:
-            if longest / APART < factor * cable.length:
+            if others / APART < factor * cable.length:
                 yield _cable_length(cable.name, unit, factor)
         yield from _dummy_places(evidence, unit, factor)
 
@@ -86,7 +86,7 @@ def _device(
 
 def _scaled(columns: slice, factor: float) -> Reading:
     def right(values: Array, _: str) -> Array:
-        out = values.copy()
+        out: Array = np.array(values)
         out[:, columns] *= factor
         return out
 

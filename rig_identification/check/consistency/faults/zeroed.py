@@ -55,7 +55,8 @@ def _zeroed(cells: tuple[str, ...], about: frozenset[str]) -> Hypothesis:
             {"channel": channel},
             {"offset": (mean, float(np.mean(spread)), "N")},
             f"{who} zeroed under load: their zeros are {told}.",
-            "Zero the cells with nothing hanging on them, and record again. Until then the zeros are estimated.",
+            "Zero the cells with nothing hanging on them, and record again. Until then the zeros are "
+            "estimated.",
         )
 
     return Hypothesis(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from rig_identification.cleaning.channel import Channel, clean_channel
+from rig_identification.cleaning.rest import check_rest
 from rig_identification.errors import InputError
 from rig_identification.raw import RawRecording, RawSession
 from rig_identification.recording import ChannelQuality, Recording, Series, Session
 from rig_identification.rig import Rig
-from rig_identification.session.channel import Channel, clean_channel
-from rig_identification.session.rest import check_rest
-from rig_identification.session.topics import foreign_cable, other_namespace
+from rig_identification.topics import foreign_cable, other_namespace
 
 #: A dynamic run must last this long to tell anything.
 SHORTEST_RUN = 1.0  # s

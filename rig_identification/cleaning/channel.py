@@ -1,0 +1,146 @@
+"""One topic's messages turned into a clean series, with an account of what was left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.cleaning.clipping import Limit, limits
+from rig_identification.cleaning.stamps import StampSelection, select_stamps
+from rig_identification.errors import InputError
+from rig_identification.raw import RawChannel
+from rig_identification.recording import ChannelQuality, Overrange, Series
+from rig_identification.topics import Topic
+
+_SECOND = 1e9
+#: Channels whose sensor has an end of range: device, quantity, axis and unit of each column.
+_CAN_CLIP: dict[str, tuple[tuple[str | None, str, str | None, str], ...]] = {
+    "tension": ((None, "tension", None, "N"),),
+    "exciter_force": tuple(("exciter", "force", a, "N") for a in "xyz"),
+    "imu": (
+        *(("imu", "angular_rate", a, "rad/s") for a in "xyz"),
+        *(("imu", "specific_force", a, "m/s^2") for a in "xyz"),
+    ),
+    "inclination": tuple(("inclinometer", "inclination", a, "rad") for a in "xy"),
+}
+#: Channels that carry a quaternion in columns 3 to 6.
+_POSES = ("mocap", "ground_truth")
+_GAP = 1.5  # median intervals
+#: No channel measures this in SI units: damaged bytes read as a number.
+_ABSURD = 1e12
+#: Samples after which a value that never changes is worth a note.
+_STUCK = 50
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Usable samples of one topic, stamps still in ns, before the recording's start is known."""
+
+    topic: Topic
+    stamp_ns: NDArray[
+        np.int64
+    ]  # (n,) strictly increasing; samples that are not finite, clipped or nearly so are left out
+    values: NDArray[np.float64]  # (n, width)
+    count: int  # messages in the bag
+    selection: StampSelection
+    ordered_ns: NDArray[np.int64]  # (m,) stamps of all kept messages, whatever their values
+    not_finite: int
+    clipped: int
+    notes: tuple[str, ...]
+    stuck: tuple[tuple[Limit, NDArray[np.int64]], ...] = ()  # ends of range, and the stamps (k,) there
+
+    def series(self, start_ns: int) -> Series | None:
+        """Samples against seconds after ``start_ns``; None where nothing was measured."""
+        if not len(self.stamp_ns):
+            return None
+        return Series((self.stamp_ns - start_ns) / _SECOND, self.values)
+
+    def quality(self, start_ns: int, *extra_notes: str) -> ChannelQuality:
+        """Account of the topic for the report."""
+        steps = np.diff(self.ordered_ns)
+        median = float(np.median(steps)) if len(steps) else 0.0
+        gaps = steps[steps > _GAP * median]
+        used = self.stamp_ns if len(self.stamp_ns) else self.ordered_ns
+        return ChannelQuality(
+            topic=self.topic.name,
+            count=self.count,
+            used=len(self.stamp_ns),
+            rate=_SECOND / median if median else 0.0,
+            start=float((used[0] - start_ns) / _SECOND),
+            end=float((used[-1] - start_ns) / _SECOND),
+            gaps=len(gaps),
+            missing=int(np.sum(np.round(gaps / median) - 1)) if len(gaps) else 0,
+            longest_gap=float(gaps.max() / _SECOND) if len(gaps) else 0.0,
+            duplicated=self.selection.duplicated,
+            backward=self.selection.backward,
+            not_finite=self.not_finite,
+            clipped=self.clipped,
+            notes=self.selection.notes + self.notes + extra_notes,
+            overranges=tuple(self._overrange(limit, stamps, start_ns) for limit, stamps in self.stuck),
+        )
+
+    def _overrange(self, limit: Limit, stamps: NDArray[np.int64], start_ns: int) -> Overrange:
+        device, quantity, axis, unit = _CAN_CLIP[self.topic.channel][limit.column]
+        first, last = (float((stamps[k] - start_ns) / _SECOND) for k in (0, -1))
+        name = device or str(self.topic.cable)
+        return Overrange(name, quantity, axis, unit, limit.value, len(stamps), first, last)
+
+
+def clean_channel(raw: RawChannel, where: str) -> Channel:
+    """Choose the usable samples of one topic; ``where`` is the bag, for messages.
+
+    Raises
+    ------
+    InputError
+        No message has a usable stamp.
+    """
+    selection = select_stamps(raw.stamp_ns, raw.received_ns)
+    if not len(selection.kept):
+        raise InputError(
+            f"{where}: {raw.topic}: none of {len(raw.stamp_ns)} stamps is usable; "
+            "stamp the messages when measured"
+        )
+    topic = Topic(raw.topic, raw.channel, raw.message_type, raw.cable)
+    kept = selection.kept
+    return _clean(topic, len(raw.stamp_ns), selection, raw.stamp_ns[kept], raw.values[kept])
+
+
+def _clean(
+    topic: Topic,
+    count: int,
+    selection: StampSelection,
+    stamp_ns: NDArray[np.int64],
+    values: NDArray[np.float64],
+) -> Channel:
+    values = np.where(np.abs(values) < _ABSURD, values, np.nan)
+    notes: tuple[str, ...] = ()
+    if topic.channel in _POSES:
+        values = _with_unit_quaternions(values)
+    finite = np.isfinite(values).all(axis=1)
+    if not finite.any():
+        notes = ("never a number in every field: taken as not measured",)
+    elif topic.channel in _CAN_CLIP and len(values) >= _STUCK and not np.ptp(values[finite], axis=0).any():
+        notes = ("the values never change: the device may be stuck or switched off",)
+    clipped = np.zeros(len(values), bool)
+    ends = limits(values[finite]) if topic.channel in _CAN_CLIP else []
+    used = finite.copy()
+    for end in ends:
+        clipped[finite] |= end.stuck
+        used[finite] &= ~end.reached
+    stuck = tuple((end, stamp_ns[finite][end.stuck]) for end in ends)
+    return Channel(
+        topic, stamp_ns[used], np.ascontiguousarray(values[used]), count, selection, stamp_ns,
+        int(np.count_nonzero(~finite)), int(np.count_nonzero(clipped)), notes, stuck,
+    )  # fmt: skip
+
+
+def _with_unit_quaternions(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions scaled to norm 1; one of norm 0 or far from 1 is no orientation and becomes NaN."""
+    norms = np.linalg.norm(values[:, 3:7], axis=1, keepdims=True)
+    norms[np.abs(norms - 1.0) > 0.1] = np.nan
+    norms[np.abs(norms - 1.0) < 1e-12] = 1.0  # a second reading changes nothing
+    unit = np.array(values)
+    unit[:, 3:7] /= norms
+    return unit
