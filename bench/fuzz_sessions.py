@@ -16,7 +16,6 @@ from rig_identification.rig import DEFAULT_TOLERANCE, Cable, CarryingFrame, Moun
 from rig_identification.session.fields import Fields
 from rig_identification.session.rig_description import rig_from_fields
 from rig_identification.session.rig_document import rig_document
-from rig_identification.session.topics import FIXED_TOPICS, WRENCH
 from rig_identification.simulate import (
     Pulled,
     RunSpec,
@@ -26,6 +25,7 @@ from rig_identification.simulate import (
     UnbalancedMass,
     simulate_session,
 )
+from rig_identification.topics import FIXED_TOPICS, WRENCH
 
 Array = NDArray[np.float64]
 

@@ -16,6 +16,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.force_noise import WHITE
 from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.estimate.whitening import whiten
 from rig_identification.mismatch.latent import MissingWrench, joined, strongest_push
 from rig_identification.mismatch.law import law_of
@@ -23,7 +24,6 @@ from rig_identification.mismatch.places import crossed, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.rider_places import travel_along
 from rig_identification.mismatch.riders import DAMPING, FREQUENCIES
-from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.supports import (
     cable_elasticity,
     ceiling_candidate,

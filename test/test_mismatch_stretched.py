@@ -11,9 +11,9 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.stretched import ENOUGH, STIFFNESSES, stretched_along
-from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.trial import VERY_FAR, attempt, mass_of
 
 

@@ -12,6 +12,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session, judged
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.estimate.verdict import weighed_otherwise
 from rig_identification.mismatch.amounts import SPACED, Amount, ringing_like, supports
 from rig_identification.mismatch.budget import Budget
@@ -19,7 +20,6 @@ from rig_identification.mismatch.first_fits import begun
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.riders import Swing, rider_candidate
 from rig_identification.mismatch.screen import Promise, carried, extended
-from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.supports import cable_elasticity
 from rig_identification.mismatch.trial import Trial, attempt, mass_of, promised
 from rig_identification.recording import Series, Session
