@@ -10,10 +10,10 @@ import pytest
 from test_simulate_identify import shaken
 
 from rig_identification.errors import InputError
-from rig_identification.estimate.followable import CannotBeFollowed, followable
+from rig_identification.estimate.followable import followable
 from rig_identification.estimate.identify import fit_session, judged, pose_problem
 from rig_identification.estimate.launch import Launch
-from rig_identification.estimate.solve import Point
+from rig_identification.estimate.solve import CannotBeFollowed, Point
 from rig_identification.estimate.unanswered import unanswered
 from rig_identification.mismatch import identify
 from rig_identification.model.motion import State

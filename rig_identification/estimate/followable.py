@@ -17,19 +17,11 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.growing import FIRST_HORIZON
 from rig_identification.estimate.prediction import linearise_run, model_at
 from rig_identification.estimate.rest_evidence import RestEvidence, linearise_rest, with_dummy
-from rig_identification.estimate.solve import Point, Problem
+from rig_identification.estimate.solve import CannotBeFollowed, Point, Problem
 from rig_identification.model.equilibrium import settle
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
-
-
-class CannotBeFollowed(FloatingPointError):
-    """The model can follow no recording of a session from its first guess."""
-
-    def __init__(self, problem: Problem, theta: Array, names: tuple[str, ...]) -> None:
-        super().__init__("the forward model cannot be evaluated at the first guess")
-        self.problem, self.theta, self.names = problem, theta, names
 
 
 @dataclass(frozen=True)
@@ -45,7 +37,7 @@ def hanging(problem: Problem, theta: Array, rest: State) -> tuple[Problem, tuple
     """The problem with the static recordings alone in which its model hangs near ``rest``; the others."""
     kept, names = [], []
     for evidence in problem.rests:
-        if _rest_of(problem, evidence, theta, rest) is None:
+        if rest_near(problem, evidence, theta, rest) is None:
             names.append(evidence.recording.name)
         else:
             kept.append(evidence)
@@ -67,7 +59,7 @@ def followable(problem: Problem, point: Point, rest: State) -> Followed:
             runs.append(run)
             starts.append(found)
     for evidence, guess in zip(problem.rests, point.rest_guesses, strict=True):
-        pose = _rest_of(problem, evidence, point.theta, guess)
+        pose = rest_near(problem, evidence, point.theta, guess)
         if pose is None:
             names.append(evidence.recording.name)
         else:
@@ -89,7 +81,7 @@ def _start_of(problem: Problem, run: Run, theta: Array, states: tuple[State, ...
     return None
 
 
-def _rest_of(problem: Problem, evidence: RestEvidence, theta: Array, guess: State) -> State | None:
+def rest_near(problem: Problem, evidence: RestEvidence, theta: Array, guess: State) -> State | None:
     """Near where the body hangs in a static recording; None where the model finds no rest."""
     if not guess.is_finite:
         return None

@@ -16,7 +16,7 @@ from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
 from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, rest_of, weak_prior
 from rig_identification.estimate.fitted import Fitted, HeldPart
-from rig_identification.estimate.followable import CannotBeFollowed, followable, hanging
+from rig_identification.estimate.followable import followable, hanging
 from rig_identification.estimate.growing import (
     HOPELESS_SQUARE,
     NEAR_SQUARE,
@@ -41,6 +41,7 @@ from rig_identification.estimate.segments import (
     with_noise_of_swing,
 )
 from rig_identification.estimate.solve import (
+    CannotBeFollowed,
     Evaluation,
     Point,
     Problem,

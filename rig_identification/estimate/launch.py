@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent, rest_of, start_from_mocap
+from rig_identification.estimate.followable import rest_near
 from rig_identification.estimate.momentum import balance, regress
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, drive, model_at
@@ -47,7 +48,8 @@ class Launch:
             weak = problem.weak.copy()
             weak[9] *= 0.15
             roughly = replace(problem, runs=(), rests=tuple(coarsened(r) for r in problem.rests), weak=weak)
-            evaluation, _ = solve(roughly, Point(theta, (), (rest,) * len(problem.rests)), tolerance=1e-2)
+            hung = tuple(rest_near(problem, evidence, theta, rest) or rest for evidence in problem.rests)
+            evaluation, _ = solve(roughly, Point(theta, (), hung), tolerance=1e-2)
             # Only the body is taken over; doubts about the rig start as described
             theta = theta.copy()
             theta[:INERTIAL] = evaluation.point.theta[:INERTIAL]

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.followable import CannotBeFollowed
 from rig_identification.estimate.launch import launch_state, launch_states
 from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.sampling import LOCAL, sample_noise_std
 from rig_identification.estimate.side_by_side import side_by_side
-from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import CannotBeFollowed, Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
 

@@ -72,6 +72,14 @@ class Point:
     latents: tuple[Array | None, ...] = ()  # (N, 6) a run: see linearise_run; empty: none
 
 
+class CannotBeFollowed(FloatingPointError):
+    """The model can follow no recording of a problem, or not all of them at once, from a first guess."""
+
+    def __init__(self, problem: Problem, theta: Array, names: tuple[str, ...]) -> None:
+        super().__init__("the forward model cannot be evaluated at the first guess")
+        self.problem, self.theta, self.names = problem, theta, names
+
+
 @dataclass(frozen=True)
 class Evaluation:
     """The problem linearised at a point."""
@@ -409,7 +417,9 @@ def solve(
     damped = damped or Damping()
     current = evaluate(problem, point)
     if current is None:
-        raise FloatingPointError("the forward model cannot be evaluated at the first guess")
+        recordings = [run.recording.name for run in problem.runs]
+        recordings += [rest.recording.name for rest in problem.rests]
+        raise CannotBeFollowed(problem, point.theta, tuple(dict.fromkeys(recordings)))
     damping, failed, creeping, idle, spent, against = damped.value, 0.0, 0, 0, 0.0, 0
     for iteration in range(iterations):
         turned_back = False

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig_identification.estimate.followable import CannotBeFollowed
 from rig_identification.estimate.observability import believed_std
+from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, Identification, InertialEstimate, Mismatch

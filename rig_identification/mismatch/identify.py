@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.followable import CannotBeFollowed
 from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit
 from rig_identification.estimate.identify import (
     Assumed,
@@ -24,6 +23,7 @@ from rig_identification.estimate.identify import (
 )
 from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
+from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.budget import SECONDS, Budget
