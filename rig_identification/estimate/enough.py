@@ -18,9 +18,9 @@ from rig_identification.estimate.evidence import Run
 
 #: Length of all fitted runs together, and of all held-out ones, s.
 SECONDS = 250.0
-#: The same where the body is only seen to swing: about a minute, thirty to sixty periods, in most of which a
-#: free swing has died away. Each way to roll and each effect that damps is fitted to all of it.
-WATCHED_SECONDS = 64.0
+#: The same where the body is only seen to swing: some twenty to fifty periods, in most of which a free swing
+#: has died away. Each way to roll and each effect that damps is fitted to all of it.
+WATCHED_SECONDS = 48.0
 #: Devices that see how a body moves and not what moves it.
 ONLY_SEE = {"mocap", "inclinometer"}
 
