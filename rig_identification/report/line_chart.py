@@ -48,13 +48,20 @@ def ticks(lower: float, upper: float, count: int) -> list[float]:
     return [float(k * step) for k in np.arange(first, last + 1)]
 
 
+#: Part of a curve's size by which it has to move to be drawn as one that does.
+BARELY = 1e-9
+
+
 def padded_limits(*series: Array, margin: float = 0.06) -> tuple[float, float]:
     """Limits that hold every finite value of the series, with a margin, never empty."""
     values = np.concatenate([s[np.isfinite(s)] for s in series])
     if not len(values):
         return -1.0, 1.0
     lower, upper = float(values.min()), float(values.max())
-    pad = margin * (upper - lower) or max(1e-3 * abs(upper), 1e-9)
+    size = max(abs(lower), abs(upper))
+    # Where rounding alone moves it ticks would be so close that they are one number
+    barely = upper - lower <= BARELY * size
+    pad = max(1e-3 * size, 1e-9) if barely else margin * (upper - lower)
     return lower - pad, upper + pad
 
 
