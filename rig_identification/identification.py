@@ -84,8 +84,17 @@ def _with_faults(mismatch: Mismatch, faults: tuple[SetupFault, ...]) -> Mismatch
     return Mismatch(
         verdict="explained" if mismatch.verdict == "none" else mismatch.verdict,
         explanation=f"{count} of the set-up {was} found before anything was fitted. {mismatch.explanation}",
-        findings=(*map(_finding, faults), *mismatch.findings),
+        findings=(*map(_finding, faults), *(f for f in mismatch.findings if not _told_before(f, faults))),
         alternatives=(*ties, *mismatch.alternatives),
+    )
+
+
+def _told_before(finding: Finding, faults: tuple[SetupFault, ...]) -> bool:
+    """Whether a finding says of an end of range what the examination has said already."""
+    place = ("channel", "quantity", "axis")
+    return finding.effect == "unknown" and any(
+        fault.effect == "saturation" and all(fault.where.get(k) == finding.where.get(k) for k in place)
+        for fault in faults
     )
 
 

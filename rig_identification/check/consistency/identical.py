@@ -24,6 +24,8 @@ SAMPLES, VALUES = 20, 8
 #: Correlation of two channels' noise beyond chance at any length, and that of a copy taken at other instants.
 SHARED = 0.5
 ORDER = 0
+#: Nats by which so many samples of noise that agree speak for a copy: each brings -log(1 - r^2) / 2.
+COPIED = float(-0.5 * SAMPLES * np.log(1.0 - 0.99**2))
 
 
 def find(session: RawSession) -> tuple[Found, ...]:
@@ -78,7 +80,7 @@ def _recordings(session: RawSession) -> Iterator[Found]:
             f"Give each run its own bag in session.yaml. {drop.name} is left out: {kept.name} cannot be "
             "fitted twice" + (", nor held out from itself." if one.holdout != other.holdout else "."),
         )
-        yield Found(replace(told, gain=float("inf")), session)
+        yield Found(replace(told, gain=COPIED), session)
 
 
 def _same(one: RawRecording, other: RawRecording) -> bool:
@@ -144,4 +146,4 @@ def _told(session: RawSession, group: list[str], left_out: tuple[str, ...], what
         f"{'is' if len(left_out) == 1 else 'are'} left out.",
         corrected=False,
     )
-    return Found(replace(told, gain=float("inf")), Change(left_out=left_out).raw(session))
+    return Found(replace(told, gain=COPIED), Change(left_out=left_out).raw(session))

@@ -223,6 +223,7 @@ class RestModel:
             row[col["tension"].start + n * k + i] = weight * gain[i]
             row[col["mass"]] = gain[i] * tension[i] * self.body_mass(x) * self.rig.gravity
             row[col["gain"].start + i], row[col["zero"].start + i] = carried[i], 1.0
+            row[col["dummy_mass"].start + k] = gain[i] * tension[i] * self.rig.gravity if seen.dummy else 0.0
             error = gain[i] * carried[i] + zero[i] - reading[0, 0]
             parts.append((np.array([sharp * error]), sharp * row[None]))
         up = pose[1][2]
@@ -378,7 +379,8 @@ def square_with(
         return without.square
     miss, slope = np.concatenate([p[0] for p in parts]), np.vstack([p[1] for p in parts])
     spread = np.eye(miss.size) + slope @ covariance @ slope.T
-    return without.square + float(miss @ np.linalg.solve(spread, miss))
+    # A fit without these readings may leave directions so open that rounding eats the 1
+    return without.square + float(miss @ np.linalg.pinv(spread, hermitian=True) @ miss)
 
 
 def _expected(model: RestModel, tension: Array, pose: tuple[Array, Array]) -> dict[str, Array]:
