@@ -46,7 +46,11 @@ class Evidence:
     _without: dict[frozenset[str], Account] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.plain = self._account(self.session)
+        self.readings = max(sum(_readings(r) for r in self.session.at_rest), 1)
+        # Cells that read nonsense turn the body at rest, and a motion about a pose that is not the rig's is lost
+        without_cells = self._account(self._lacking(self.cells))
+        self.plain = self._account(self.session, None, without_cells)
+        self._without[self.cells] = self._account(self._lacking(self.cells), None, self.plain, moved=False)
 
     @property
     def cells(self) -> frozenset[str]:
@@ -56,10 +60,13 @@ class Evidence:
     def without(self, devices: frozenset[str]) -> Account:
         """The session without some devices' readings; ``imu.gyroscope`` stands for one half of an IMU."""
         if devices not in self._without:
-            recordings = tuple(_lacking(r, devices) for r in self.session.recordings)
-            lacking = ReducedSession(self.session.rig, recordings)
+            lacking = self._lacking(devices)
             self._without[devices] = self._account(lacking, None, self.plain, bool(devices & MOVING))
         return self._without[devices]
+
+    def _lacking(self, devices: frozenset[str]) -> ReducedSession:
+        recordings = tuple(_lacking(r, devices) for r in self.session.recordings)
+        return ReducedSession(self.session.rig, recordings)
 
     def bound(self, devices: frozenset[str]) -> float:
         """Nats that a hypothesis about these devices can gain at most. "rest": what rest disagrees by."""
@@ -97,7 +104,7 @@ class Evidence:
         return self.plain.rest if agree and self.plain.rest is not None else start.rest
 
     def _rest_nats(self, square: float) -> float:
-        return 0.5 * self.readings * float(np.log1p(square / self.readings))
+        return 0.5 * self.readings * float(np.log1p(max(square, 0.0) / self.readings))
 
     def _account(
         self,
@@ -114,8 +121,6 @@ class Evidence:
         rest = fit_rest(session.rig, session.at_rest, loosened)
         if rest is None:
             return Account(None, (), float("inf"), {})
-        if not hasattr(self, "readings"):
-            self.readings = max(rest.readings, 1)
         parts = {"rest": self._rest_nats(rest.square)}
         motions = []
         for k, run in enumerate(session.runs[:RUNS]):
@@ -125,6 +130,12 @@ class Evidence:
             motions.append(motion)
             parts |= _parts(session.rig, run, rest, motion)
         return Account(rest, tuple(motions), float(sum(parts.values())), parts)
+
+
+def _readings(recording: Reduced) -> int:
+    """Numbers that a recording holds of the body at rest: angular rate tells nothing there."""
+    held = (v[0, 3:] if device == "imu" else v[0] for device, v in recording.values.items())
+    return sum(int(np.count_nonzero(np.isfinite(one))) for one in held)
 
 
 def _motion(rig: Rig, run: Reduced, rest: RestFit, begun: MotionFit | None, moved: bool) -> MotionFit:

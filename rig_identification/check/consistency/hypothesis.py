@@ -120,6 +120,7 @@ class Hypothesis:
     #: What remains to be changed once the fit is known (zeros of cells, the known mass), or None.
     fitted: Callable[[RestFit], Change] | None = None
     free: int = 0  # numbers that the hypothesis fits
+    penalty: float = 0.0  # nats that speak against it before any reading is looked at
     fresh: bool = False  # no first-order evaluation: the description itself changes
 
 

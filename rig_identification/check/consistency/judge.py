@@ -103,7 +103,7 @@ def _weigh(evidence: Evidence, hypothesis: Hypothesis, thorough: bool) -> Weighe
     if account.rest is None:
         return Weighed(hypothesis, account, -np.inf, -np.inf)
     gain = evidence.plain.cost - account.cost
-    price = PRIOR + float(np.log(hypothesis.variants)) + NUMBER * hypothesis.free
+    price = PRIOR + float(np.log(hypothesis.variants)) + NUMBER * hypothesis.free + hypothesis.penalty
     return Weighed(hypothesis, account, gain, gain - price)
 
 

@@ -44,6 +44,8 @@ EXACT = (0.1, 0.01, 0.001, 1e-4)
 FREE = 1.0
 #: Steps at each of them.
 ITERATIONS = 8
+#: Std of a belief that is said to be certain: a tolerance of zero.
+CERTAIN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ class RestModel:
         heavy = np.array([r.dummy.mass if r.dummy else 1.0 for r in self.recordings])
         std[self.columns["dummy_mass"]] = heavy * (FREE if loose.dummy_mass else DUMMY_MASS)
         std[self.columns["dummy_place"]] = self.span * (FREE if loose.dummy_place else DUMMY_PLACE)
-        return std
+        return np.maximum(std, CERTAIN)
 
     def start(self) -> Array:
         """(u,) unknowns of a level body; poses are kept apart (:meth:`start_poses`)."""

@@ -82,7 +82,8 @@ def _imu(rig: Rig, half: str, turn: Array) -> Hypothesis:
         return fault("axes", where, {}, statement, advice, _corrected_mount(rig, half, turn))
 
     readings: dict[str, Reading] = {"imu": right}
-    return Hypothesis(Change(readings), describe, frozenset([half]), variants=47)
+    # Without any IMU the motion may be unknown, and a first-order step from there tells nothing
+    return Hypothesis(Change(readings), describe, frozenset([half]), variants=47, fresh=half == "imu")
 
 
 def _inclinometer(turn: Array) -> Hypothesis:

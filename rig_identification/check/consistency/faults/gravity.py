@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -36,11 +36,19 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
     if still is None or not np.linalg.norm(still[0, 3:]) < NOTHING * rig.gravity:
         return
     R_imu = Rotation.from_quat(rig.imu.orientation).as_matrix()
-    missing: dict[str, Array] = {}
-    for recording, expected in zip(evidence.session.at_rest, account.rest.expected, strict=True):
-        missing[recording.name] = expected["imu"][None]
+    at_rest = account.rest.expected[0]["imu"][None]
+    missing: dict[str, Array] = {r.name: at_rest for r in evidence.session.recordings}
+    yield Hypothesis(Change({"imu": _with(missing)}), _describe_level, about, variants=2)
     for run, motion in zip(evidence.session.runs, account.motions, strict=False):
-        missing[run.name] = rig.gravity * motion.trajectory.R[:, 2] @ R_imu
+        missing = {**missing, run.name: rig.gravity * motion.trajectory.R[:, 2] @ R_imu}
+    silent = Change({"imu": _silent}, rig=_deaf)
+    yield Hypothesis(
+        Change({"imu": _with(missing)}), _describe, about, variants=2, fitted=lambda rest: silent
+    )
+
+
+def _with(missing: Mapping[str, Array]) -> Reading:
+    """Specific force with what is missing put back, where it is known at every instant."""
 
     def right(values: Array, name: str) -> Array:
         out: Array = np.array(values)
@@ -49,20 +57,30 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
             out[:, 3:] += add
         return out
 
-    def describe(rest: RestFit | None) -> SetupFault:
-        return fault(
-            "axes",
-            {"channel": "imu", "part": "accelerometer", "kind": "gravity_removed"},
-            {},
-            "The accelerometer reads about 0 at rest: the driver has taken gravity out of its readings.",
-            "Publish the raw specific force, +9.81 m/s^2 upwards at rest. Until then it is left out: gravity "
-            "was taken out by an attitude that the driver guessed.",
-            corrected=False,
-        )
+    return right
 
-    readings: dict[str, Reading] = {"imu": right}
-    return_deaf = Change({"imu": _silent}, rig=_deaf)
-    yield Hypothesis(Change(readings), describe, about, variants=1, fitted=lambda rest: return_deaf)
+
+def _describe_level(rest: RestFit | None) -> SetupFault:
+    return fault(
+        "axes",
+        {"channel": "imu", "part": "accelerometer", "kind": "gravity_removed"},
+        {},
+        "The accelerometer reads about 0 at rest: its reading there has been taken off as if it were a bias.",
+        "Publish the raw specific force, +9.81 m/s^2 upwards at rest, and zero the accelerometer by no more "
+        "than its bias.",
+    )
+
+
+def _describe(rest: RestFit | None) -> SetupFault:
+    return fault(
+        "axes",
+        {"channel": "imu", "part": "accelerometer", "kind": "gravity_removed"},
+        {},
+        "The accelerometer reads about 0 at rest: the driver has taken gravity out of its readings.",
+        "Publish the raw specific force, +9.81 m/s^2 upwards at rest. Until then it is left out: gravity "
+        "was taken out by an attitude that the driver guessed.",
+        corrected=False,
+    )
 
 
 def _silent(values: Array, name: str) -> Array:

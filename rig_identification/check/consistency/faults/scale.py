@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.faults.unit import POUND
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
@@ -18,7 +20,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
     rig = evidence.session.rig
     if rig.mass is not None:
         yield _pounds(rig.mass)
-        yield _another(rig.mass)
+        yield _another(evidence, rig.mass)
 
 
 def _pounds(mass: float) -> Hypothesis:
@@ -40,7 +42,15 @@ def _pounds(mass: float) -> Hypothesis:
     return Hypothesis(Change(rig=right), describe, frozenset(["rest"]), variants=2, fresh=True)
 
 
-def _another(mass: float) -> Hypothesis:
+def _another(evidence: Evidence, mass: float) -> Hypothesis:
+    """A body is weighed wrongly by a factor of two or three, not of hundreds: log-normal, a factor e."""
+    loads = [
+        abs(float(reading[0, 0]))
+        for cable in evidence.session.rig.cables
+        if (reading := evidence.session.at_rest[0].values.get(cable.name)) is not None
+    ]
+    carried = max(sum(loads) / evidence.session.rig.gravity, 1e-6)
+
     def describe(rest: RestFit | None) -> SetupFault:
         found, std = (mass, 0.0) if rest is None else (rest.mass, rest.mass * float(rest.value("mass")[1][0]))
         return fault(
@@ -53,5 +63,5 @@ def _another(mass: float) -> Hypothesis:
 
     return Hypothesis(
         Change(rig=lambda rig: replace(rig, mass=None, mass_std=None)), describe, frozenset(["rest"]),
-        variants=2, free=1, fresh=True,
+        variants=2, free=1, fresh=True, penalty=0.5 * float(np.log(carried / mass) ** 2),
     )  # fmt: skip
