@@ -110,7 +110,7 @@ def test_a_stray_stamp_moves_no_device() -> None:
 
 
 @given(st.sampled_from([-3e7, -3600.0, -37.0, 37.0, 100.0, 1e6]), st.sampled_from(sorted(SENT)))
-def test_a_device_on_another_clock_is_told_with_its_amount(late: float, topic: str) -> None:
+def test_a_device_on_other_clock_is_told_with_its_amount(late: float, topic: str) -> None:
     one = recording("run_1", **{topic.partition("/")[0]: late})
     sentences = told(one)
     apart = offsets(one)

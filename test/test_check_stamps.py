@@ -136,8 +136,8 @@ FAULTS: dict[str, tuple[str, Callable[[Stamps], Stamps], float]] = {
     "TAI": ("leap_seconds", lambda s: s + 37 * SECOND, 1e-9),
     "GPS": ("leap_seconds", lambda s: s + 18 * SECOND, 1e-9),
     "zone": ("leap_seconds", lambda s: s - 7200 * SECOND, 1e-9),
-    "since boot": ("another_clock", lambda s: s - START + 5321 * SECOND, 1e-3),
-    "unsynchronized": ("another_clock", lambda s: s + 2_345_678_901, 1e-3),
+    "since boot": ("other_clock", lambda s: s - START + 5321 * SECOND, 1e-3),
+    "unsynchronized": ("other_clock", lambda s: s + 2_345_678_901, 1e-3),
     "simulated": ("simulated_stamps", lambda s: s - s[0] + 1, 1e-3),
     "never set": ("zero_stamps", np.zeros_like, 1e-3),
     "step on": ("clock_step", step(0.3), 1e-3),
@@ -177,7 +177,7 @@ def test_a_fault_of_all_devices_is_one(name: str) -> None:
     assert np.ptp(apart) < max(2.0 * tolerance, 1e-9)
 
 
-def test_a_logger_on_another_clock_is_told_once() -> None:
+def test_a_logger_on_other_clock_is_told_once() -> None:
     raw = session()
     topics = ("/rig/cable_1/wrench", "/rig/cable_2/wrench", "/rig/cable_3/wrench")
     corrected, (fault,) = examined(with_fault(raw, lambda s: s + 37 * SECOND, topics))

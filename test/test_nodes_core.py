@@ -123,7 +123,7 @@ def test_the_gate_counts_what_a_gap_lacks() -> None:
     assert (gate.gaps, gate.missing) == (1, 3)
 
 
-def test_the_gate_follows_a_device_that_was_restarted_with_another_clock() -> None:
+def test_the_gate_follows_a_device_that_was_restarted_with_other_clock() -> None:
     gate = StampGate()
     first = START + SECOND // 100 * np.arange(100)
     gate.admit(first, first)

@@ -138,7 +138,7 @@ def test_a_device_that_restarts_keeps_its_longer_part(tmp_path: Path, jump: floa
     assert read.duration == written.duration
 
 
-def test_a_device_on_another_clock_is_left_aside(tmp_path: Path) -> None:
+def test_a_device_on_other_clock_is_left_aside(tmp_path: Path) -> None:
     def edit(topic: str, index: int, message: Any) -> Any:
         return shift_stamp(message, -1_700_000_000 * SECOND) if topic == IMU else message
 

@@ -13,7 +13,13 @@ import numpy as np
 
 from rig_identification.check.consistency.forces import ForceModel
 from rig_identification.check.consistency.hypothesis import Hypothesis
-from rig_identification.check.consistency.motion import MotionFit, MotionModel
+from rig_identification.check.consistency.motion import (
+    INDEPENDENT,
+    ORDINARY,
+    MotionFit,
+    MotionModel,
+    nats,
+)
 from rig_identification.check.consistency.reduced import Reduced, ReducedSession
 from rig_identification.check.consistency.rest import Loosened, RestFit, fit_rest, square_with
 from rig_identification.check.consistency.tracker import TrackerModel
@@ -47,7 +53,7 @@ class Evidence:
 
     def __post_init__(self) -> None:
         self.readings = max(sum(_readings(r) for r in self.session.at_rest), 1)
-        # Cells that read nonsense turn the body at rest, and a motion about a pose that is not the rig's is lost
+        # Cells that read nonsense turn the body at rest, and a motion about that pose is lost
         without_cells = self._account(self._lacking(self.cells))
         self.plain = self._account(self.session, None, without_cells)
         self._without[self.cells] = self._account(self._lacking(self.cells), None, self.plain, moved=False)
@@ -104,7 +110,9 @@ class Evidence:
         return self.plain.rest if agree and self.plain.rest is not None else start.rest
 
     def _rest_nats(self, square: float) -> float:
-        return 0.5 * self.readings * float(np.log1p(max(square, 0.0) / self.readings))
+        """Nats by which rest disagrees: as for motion, how large ordinary errors are here is not known."""
+        each = np.array([max(square, 0.0) / self.readings])
+        return float(self.readings / INDEPENDENT * nats(each, np.full(1, ORDINARY))[0])
 
     def _account(
         self,
@@ -124,11 +132,10 @@ class Evidence:
         parts = {"rest": self._rest_nats(rest.square)}
         motions = []
         for k, run in enumerate(session.runs[:RUNS]):
-            motion = _motion(
-                session.rig, run, rest, begun.motions[k] if begun and begun.motions else None, moved
-            )
+            before = begun.motions[k] if begun is not None and begun.motions else None
+            motion, more = _best_motion(session.rig, run, rest, before, moved)
             motions.append(motion)
-            parts |= _parts(session.rig, run, rest, motion)
+            parts |= more
         return Account(rest, tuple(motions), float(sum(parts.values())), parts)
 
 
@@ -138,15 +145,24 @@ def _readings(recording: Reduced) -> int:
     return sum(int(np.count_nonzero(np.isfinite(one))) for one in held)
 
 
-def _motion(rig: Rig, run: Reduced, rest: RestFit, begun: MotionFit | None, moved: bool) -> MotionFit:
-    """The motion of one run, from rest and from another account's."""
-    if begun is not None and not moved:
-        return begun
+def _best_motion(
+    rig: Rig, run: Reduced, rest: RestFit, begun: MotionFit | None, moved: bool
+) -> tuple[MotionFit, dict[str, float]]:
+    """The motion that agrees best with all readings of one run.
+
+    Tried are another account's, the same settled, and one from rest. With the other account's motion itself
+    among them a session without a device never agrees worse than with it.
+    """
     model = MotionModel(rig, run, *rest.poses[0])
-    tried = [model.settled(run.values)]
+    tried = []
     if begun is not None:
-        tried.append(model.settled(run.values, begun.trajectory))
-    return min(tried, key=lambda fit: fit.total)
+        tried.append(model.at(run.values, begun.trajectory))
+    if moved or begun is None:
+        tried.append(model.settled(run.values))
+        if begun is not None:
+            tried.append(model.settled(run.values, begun.trajectory))
+    judged = [(motion, _parts(rig, run, rest, motion)) for motion in tried]
+    return min(judged, key=lambda pair: sum(pair[1].values()))
 
 
 def _parts(rig: Rig, run: Reduced, rest: RestFit, motion: MotionFit) -> dict[str, float]:

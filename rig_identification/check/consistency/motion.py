@@ -165,13 +165,13 @@ class MotionModel:
         try:
             change, constants = self.spline.solve(blocks)
         except (np.linalg.LinAlgError, ValueError):  # a motion that has left every bound has no next step
-            return self._seen(values, at)
+            return self.at(values, at)
         left = {b.name: self.spline.left(b, change, constants[b.name]) for b in blocks}
         return self._judged(blocks, left, self._moved(at, change))
 
     def once(self, values: Mapping[str, Array], about: Trajectory) -> MotionFit:
         """One step from a trajectory, judged where it ends."""
-        return self._seen(values, self.fit(values, about).trajectory)
+        return self.at(values, self.fit(values, about).trajectory)
 
     def settled(self, values: Mapping[str, Array], about: Trajectory | None = None) -> MotionFit:
         """The same, linearised anew about the motion that was found until it settles.
@@ -201,7 +201,7 @@ class MotionModel:
         except (np.linalg.LinAlgError, ValueError):  # a motion that has left every bound has no next step
             return at
 
-    def _seen(self, values: Mapping[str, Array], at: Trajectory) -> MotionFit:
+    def at(self, values: Mapping[str, Array], at: Trajectory) -> MotionFit:
         """What a trajectory leaves of the readings, each reading's constant taken off."""
         return self._looked_at(self._blocks(at, values), at)
 

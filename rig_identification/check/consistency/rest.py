@@ -136,7 +136,7 @@ class RestModel:
         heavy = np.array([r.dummy.mass if r.dummy else 1.0 for r in self.recordings])
         std[self.columns["dummy_mass"]] = heavy * (FREE if loose.dummy_mass else DUMMY_MASS)
         std[self.columns["dummy_place"]] = self.span * (FREE if loose.dummy_place else DUMMY_PLACE)
-        return np.maximum(std, CERTAIN)
+        return np.asarray(np.maximum(std, CERTAIN))
 
     def start(self) -> Array:
         """(u,) unknowns of a level body; poses are kept apart (:meth:`start_poses`)."""

@@ -81,7 +81,7 @@ def _kind(off: _Off) -> str:
     if off.exact is not None:
         return "leap_seconds"
     start = int(off.stream.stamps.min())
-    return "simulated_stamps" if start < 60 * SECOND else "another_clock"
+    return "simulated_stamps" if start < 60 * SECOND else "other_clock"
 
 
 def _shifted(off: _Off) -> Stamps:
@@ -224,7 +224,7 @@ def _told(session: RawSession, devices: frozenset[str], kind: str, some: list[_O
 
 _ADVICE = {
     "leap_seconds": "Set the device or its driver to UTC, as the other devices' stamps are.",
-    "another_clock": "Synchronize the device's clock with the recording computer's (NTP, PTP), or stamp its "
+    "other_clock": "Synchronize the device's clock with the recording computer's (NTP, PTP), or stamp its "
     "messages with the computer's clock.",
     "simulated_stamps": "Switch use_sim_time off in the driver, or stamp its messages with the computer's "
     "clock.",

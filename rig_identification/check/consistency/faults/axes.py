@@ -26,16 +26,18 @@ HALVES: dict[str, tuple[tuple[slice, ...], str]] = {
 #: Cosine between measured and expected direction of gravity below which a permutation is not tried: half
 #: of the 90 degrees by which another permutation misses.
 ALIGNED = 0.7
+#: Permutations of a gyroscope that are tried of 47: at worst one axis turns at all, and four have it right.
+LIKELY = 6
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
     """Signed permutations of the IMU, of each half of it, and of the inclinometer."""
     rig = evidence.session.rig
     if rig.imu is not None:
+        upright = [turn for turn in signed_permutations(3) if _upright(evidence, turn)]
         for half in HALVES:
-            for turn in signed_permutations(3):
-                if half == "imu.gyroscope" or _upright(evidence, turn):
-                    yield _imu(rig, half, turn)
+            for turn in _likely_rates(evidence) if half == "imu.gyroscope" else upright:
+                yield _imu(rig, half, turn)
     if rig.inclinometer is not None:
         for turn in signed_permutations(2):
             yield _inclinometer(turn)
@@ -51,6 +53,28 @@ def signed_permutations(size: int) -> list[Array]:
             out.append(turn)
     changes = [np.count_nonzero(turn != np.eye(size)) for turn in out]
     return [out[k] for k in np.argsort(changes, kind="stable") if changes[k]]
+
+
+def _likely_rates(evidence: Evidence) -> list[Array]:
+    """Permutations of the gyroscope nearest to the rate of a motion that is found without it, or with it."""
+    rig = evidence.session.rig
+    runs = [r for r in evidence.session.runs if "imu" in r.values]
+    if rig.imu is None or not runs or not evidence.plain.motions:
+        return []
+    R_imu = Rotation.from_quat(rig.imu.orientation).as_matrix()
+    found = []
+    for account in (evidence.without(frozenset(["imu.gyroscope"])), evidence.plain):
+        rate = account.motions[0].trajectory.rate @ R_imu
+        measured = runs[0].values["imu"][:, :3]
+        known = np.isfinite(measured).all(axis=1)
+        if not known.any():
+            continue
+        ranked = sorted(
+            signed_permutations(3),
+            key=lambda turn: float(np.mean((measured[known] @ turn.T - rate[known]) ** 2)),
+        )
+        found += ranked[:LIKELY]
+    return [turn for k, turn in enumerate(found) if not any(np.array_equal(turn, t) for t in found[:k])]
 
 
 def _upright(evidence: Evidence, turn: Array) -> bool:

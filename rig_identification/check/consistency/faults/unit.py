@@ -26,7 +26,7 @@ LENGTHS = {"mm": 0.001, "cm": 0.01, "inches": INCH, "feet": 12.0 * INCH}
 
 
 #: A cell whose scale is off by more than this factor has no calibration at all.
-FAR = 5.0
+FAR = 2.0
 #: A rig's cables differ in length by less than this factor: a length in another unit stands out by more.
 APART = 10.0
 
@@ -113,11 +113,14 @@ def _proportional(chosen: tuple[str, ...], factor: float, about: frozenset[str])
             },
             {"factor": (factor, 0.01 * factor, "N per count")},
             f"{who} in no unit of force, perhaps raw counts: one of them is about {factor:.4g} N.",
-            "Calibrate in the driver: publish N. Until then the scale is what the body's weight says.",
+            "Calibrate in the driver: publish N. Until then it is left out: nothing tells a cell's scale and "
+            "zero well enough.",
+            corrected=False,
         )
 
     change = Change({c: _scaled(slice(None), factor) for c in chosen})
-    return Hypothesis(change, describe, about, variants=len(about) + 1, free=1)
+    out = Change(left_out=chosen)
+    return Hypothesis(change, describe, about, variants=len(about) + 1, free=1, fitted=lambda rest: out)
 
 
 def _scaled(columns: slice, factor: float) -> Reading:

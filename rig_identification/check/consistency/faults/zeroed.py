@@ -8,7 +8,7 @@ import numpy as np
 
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
-from rig_identification.check.consistency.rest import Loosened, RestFit
+from rig_identification.check.consistency.rest import DOUBT, Loosened, RestFit
 from rig_identification.examination import SetupFault
 
 #: A cell that reads less than this share of its even load reads about nothing.
@@ -16,25 +16,27 @@ NOTHING = 0.1
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """Every cell that reads about nothing at rest by itself, and all such cells together."""
-    rig, rest = evidence.session.rig, evidence.plain.rest
+    """All cells that read about nothing in one recording at rest: a cable that holds a body carries a load."""
+    rig, rest = evidence.session.rig, evidence.without(evidence.cells).rest
     if rest is None:
         return
     even = rest.mass * rig.gravity / len(rig.cables)
-    names = [c.name for c in rig.cables]
-    empty = tuple(
-        name
-        for name in names
-        if any(
-            name in r.values and abs(float(r.values[name][0, 0])) < NOTHING * even
-            for r in evidence.session.at_rest
-        )
-    )
-    for cells in {empty, *((name,) for name in empty)} - {()}:
-        yield _zeroed(cells, frozenset(names))
+    for recording in evidence.session.at_rest:
+        loads = {
+            c.name: abs(float(recording.values[c.name][0, 0]))
+            for c in rig.cables
+            if c.name in recording.values
+        }
+        empty = tuple(name for name, load in loads.items() if load < NOTHING * even)
+        if empty:
+            least = rig.tolerance["load_cell_zero"] / DOUBT
+            near = [NOTHING * even / max(loads[name], least, 1e-9) for name in empty]
+            yield _zeroed(empty, evidence.cells, float(np.sum(np.log(np.maximum(near, 1.0)))))
 
 
-def _zeroed(cells: tuple[str, ...], about: frozenset[str]) -> Hypothesis:
+def _zeroed(cells: tuple[str, ...], about: frozenset[str], exactly: float) -> Hypothesis:
+    """exactly: nats by which readings so near to zero speak against loads that happen to be small."""
+
     def zeros(rest: RestFit) -> dict[str, float]:
         values = rest.value("zero")[0]
         return {name: float(values[k]) for k, name in enumerate(rest.expected[0]) if name in cells}
@@ -60,7 +62,14 @@ def _zeroed(cells: tuple[str, ...], about: frozenset[str]) -> Hypothesis:
         )
 
     return Hypothesis(
-        Change(), describe, about, variants=4, loosened=Loosened(zeros=cells), fitted=fitted, free=len(cells)
+        Change(),
+        describe,
+        about,
+        variants=4,
+        loosened=Loosened(zeros=cells),
+        fitted=fitted,
+        free=len(cells),
+        penalty=-exactly,
     )
 
 
