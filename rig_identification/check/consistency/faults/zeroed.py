@@ -16,7 +16,7 @@ NOTHING = 0.1
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """All cells that read about nothing in one recording at rest: a cable that holds a body carries a load."""
+    """All cells that read about nothing in one recording at rest: each cable that holds a body pulls."""
     rig, rest = evidence.session.rig, evidence.without(evidence.cells).rest
     if rest is None:
         return
