@@ -15,16 +15,12 @@ from rig_identification.check.consistency import identical, judge
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.faults.axes import signed_permutations
 from rig_identification.check.consistency.forces import ForceModel
-from rig_identification.check.consistency.motion import MotionModel, Trajectory, nats
+from rig_identification.check.consistency.motion import MotionModel, nats
 from rig_identification.check.consistency.reduced import PER_SPAN, ReducedSession, reduced
-from rig_identification.check.consistency.rest import (
-    Loosened,
-    RestModel,
-    _moved,
-    fit_rest,
-    square_with,
-)
+from rig_identification.check.consistency.rest import _moved, fit_rest, square_with
+from rig_identification.check.consistency.rest_model import Loosened, RestModel
 from rig_identification.check.consistency.tracker import TrackerModel
+from rig_identification.check.consistency.trajectory import Trajectory
 from rig_identification.cli.commands.demo import demo_spec
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession

@@ -21,7 +21,8 @@ from rig_identification.check.consistency.motion import (
     nats,
 )
 from rig_identification.check.consistency.reduced import Reduced, ReducedSession
-from rig_identification.check.consistency.rest import Loosened, RestFit, fit_rest, square_with
+from rig_identification.check.consistency.rest import RestFit, fit_rest, square_with
+from rig_identification.check.consistency.rest_model import Loosened
 from rig_identification.check.consistency.tracker import TrackerModel
 from rig_identification.rig import Rig
 

@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.check.consistency.motion import ACROSS, ORDINARY, TINY, Trajectory, nats
-from rig_identification.check.consistency.rest import SCALE, RestFit
+from rig_identification.check.consistency.motion import ACROSS, ORDINARY, TINY, nats
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.rest_model import SCALE
+from rig_identification.check.consistency.trajectory import Trajectory
 from rig_identification.rig import Rig
 from rig_identification.statics.balance import skew
 

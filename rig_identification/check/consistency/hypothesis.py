@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.check.consistency.reduced import Reduced, ReducedSession
-from rig_identification.check.consistency.rest import Loosened, RestFit
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.rest_model import Loosened
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 from rig_identification.recording import Dummy
@@ -36,11 +37,6 @@ class Change:
     )  # cable -> cables that are in its reading
     left_out: tuple[str, ...] = ()  # devices that cannot be put right
     dropped: tuple[str, ...] = ()  # recordings that cannot be used
-
-    @property
-    def devices(self) -> frozenset[str]:
-        """Devices whose readings change."""
-        return frozenset((*self.readings, *self.wires, *self.less, *self.left_out))
 
     def reduced(self, session: ReducedSession) -> ReducedSession:
         """The reduced session without the fault."""

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.check.consistency.motion import ACROSS, INDEPENDENT, ORDINARY, TINY, Trajectory, nats
+from rig_identification.check.consistency.motion import ACROSS, INDEPENDENT, ORDINARY, TINY, nats
+from rig_identification.check.consistency.trajectory import Trajectory
 from rig_identification.rig import Rig
 from rig_identification.statics.balance import skew
 

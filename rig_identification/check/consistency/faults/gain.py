@@ -7,7 +7,8 @@ from itertools import combinations
 
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
-from rig_identification.check.consistency.rest import Loosened, RestFit
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.rest_model import Loosened
 from rig_identification.examination import SetupFault
 
 

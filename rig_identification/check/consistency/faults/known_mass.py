@@ -11,7 +11,8 @@ import numpy as np
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.faults.unit import POUND
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
-from rig_identification.check.consistency.rest import Loosened, RestFit
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.rest_model import Loosened
 from rig_identification.examination import SetupFault
 from rig_identification.recording import Dummy
 

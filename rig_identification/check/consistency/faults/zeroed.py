@@ -8,7 +8,8 @@ import numpy as np
 
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
-from rig_identification.check.consistency.rest import DOUBT, Loosened, RestFit
+from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.rest_model import DOUBT, Loosened
 from rig_identification.examination import SetupFault
 
 #: A cell that reads less than this share of its even load reads about nothing.
