@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rig_identification.statics.adjustment import Adjusted
 from rig_identification.statics.balance import balance, is_stable
@@ -40,7 +40,7 @@ def judge(
     cables = [cable.name for cable in model.rig.cables]
     if adjusted.constraint_error > 1e-7:
         return "inconsistent", "The cables cannot be brought to balance with these readings."
-    if freedom > 0 and float(chi2.sf(chi_squared, freedom)) < IMPROBABLE:
+    if freedom > 0 and float(chdtrc(freedom, chi_squared)) < IMPROBABLE:
         settled = "" if adjusted.converged else " (the adjustment did not settle)"
         return "inconsistent", (
             f"Readings and rig description do not agree: chi squared {chi_squared:.3g} "

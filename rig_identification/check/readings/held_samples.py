@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from rig_identification.check.found import Found
 from rig_identification.check.readings.channel_model import (
@@ -148,7 +148,7 @@ def _changes(values: Array, columns: tuple[int, ...]) -> _Changes:
 def _hold(values: Array, columns: tuple[int, ...], changes: _Changes) -> _Hold | None:
     """How long each value is held, None where nothing shows that it is."""
     n, k, p = changes.events, changes.repeated, min(changes.chance, 0.5)
-    if n < _DISTINCT or changes.distinct < _DISTINCT or binom.sf(k - 1, n, p) > FALSE_ALARM:
+    if n < _DISTINCT or changes.distinct < _DISTINCT or bdtrc(k - 1, n, p) > FALSE_ALARM:
         return None
     lengths = _lengths(repeats(values, columns))
     typical = float(np.median(lengths))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc, xlogy
 
 from rig_identification.check.found import Found
 from rig_identification.check.readings.channel_model import Flags, channels_of, runs
@@ -112,14 +112,15 @@ def _damaged(witnessed: list[_Witnessed]) -> bool:
     for one in witnessed:
         if one.witnesses and one.chance < _BLOWS_SEEN:
             count, seen = len(one.seen), int(np.count_nonzero(one.seen))
-            gain += float(binom.logpmf(seen, count, one.chance) - binom.logpmf(seen, count, _BLOWS_SEEN))
+            gain += float(xlogy(seen, one.chance / _BLOWS_SEEN))
+            gain += float(xlogy(count - seen, (1.0 - one.chance) / (1.0 - _BLOWS_SEEN)))
     return bool(gain > _DOUBT)
 
 
 def _unseen(own: Outliers, one: _Witnessed) -> Flags:
     """(n,) the spikes without those that others see, where these are more than chance makes them."""
     spike = np.array(own.spike)
-    if binom.sf(np.count_nonzero(one.seen) - 1, len(one.seen), one.chance) <= _CHANCE:
+    if bdtrc(np.count_nonzero(one.seen) - 1, len(one.seen), one.chance) <= _CHANCE:
         for a, b in [
             pair for pair, seen in zip(zip(*runs(spike), strict=True), one.seen, strict=True) if seen
         ]:
