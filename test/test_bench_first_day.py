@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+pytest.importorskip("mujoco", reason="the bench's engine is not installed: pip install '.[dev]'")
+
 from bench.concealed.draw import draw_scene
 from bench.concealed.inertia import add_point
 from bench.first_day.faults import all_cases

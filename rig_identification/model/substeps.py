@@ -42,9 +42,9 @@ RESOLVED_INTERNAL = 0.5
 STABLE = 2.5
 #: Substeps for which hinges that creep slower yet are not followed.
 MOST = 8
-#: Substeps for which a body that bounces faster yet is not followed: at 250 Hz with nodes 10 ms apart. What
-#: bounces faster on its cables is light and thin beyond what hangs on any, and each step would take minutes.
-FINEST = 40
+#: rad/s; a body that bounces faster than at 250 Hz is followed as if it bounced so. What bounces faster on
+#: its cables is light and thin beyond what hangs on any, and each run would take minutes.
+FASTEST = 2.0 * np.pi * 250.0
 
 
 def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> int:
@@ -61,7 +61,7 @@ def substeps_for(model: RigModel, step: float, longest: float = FINE_STEP) -> in
     elastic = (model.modes == layout.ELASTIC) | (model.modes == layout.ELASTIC_ROD)
     if not np.any(elastic):
         return plain
-    return max(plain, min(FINEST, int(np.ceil(step * _bounce(model, elastic) / RESOLVED))))
+    return max(plain, int(np.ceil(step * min(_bounce(model, elastic), FASTEST) / RESOLVED)))
 
 
 def _bounce(model: RigModel, elastic: NDArray[np.bool_]) -> float:
