@@ -2,7 +2,6 @@
 
 import importlib
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -68,7 +67,7 @@ def test_a_body_less_its_rotor_moves_as_the_body_that_held_it(session):
 def test_what_the_thesis_left_out_is_found_and_the_inertia_comes_back(monkeypatch):
     # What is found, and not how soon: beside another test slow cores take longer than a search may
     module = importlib.import_module("rig_identification.mismatch.identify")
-    monkeypatch.setattr(module, "Budget", partial(Budget, 600.0))
+    monkeypatch.setattr(module, "Budget", lambda seconds: Budget(600.0))
     found = examine(load_case(14), 1)
     assert found.verdict == "explained"
     told = {f.effect: next(iter(f.parameters.values())) for f in found.findings}
