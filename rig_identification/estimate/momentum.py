@@ -22,7 +22,7 @@ from rig_identification.estimate.prediction import drive
 from rig_identification.estimate.sampling import node_values
 from rig_identification.estimate.track import Track
 from rig_identification.model import layout
-from rig_identification.model.body import linear_from_log_cholesky, linear_in_log_cholesky
+from rig_identification.model.body import inertia_times, linear_from_log_cholesky, linear_in_log_cholesky
 from rig_identification.model.definite import definite
 from rig_identification.model.so3 import skew
 
@@ -34,16 +34,6 @@ WINDOW = 0.25
 REGRESSION_STEPS = 12
 
 
-def _products(v: Array) -> Array:
-    """(N, 3, 6): I v as a linear map of (xx, xy, xz, yy, yz, zz)."""
-    out = np.zeros((v.shape[0], 3, 6))
-    x, y, z = v.T
-    out[:, 0, 0], out[:, 0, 1], out[:, 0, 2] = x, y, z
-    out[:, 1, 1], out[:, 1, 3], out[:, 1, 4] = x, y, z
-    out[:, 2, 2], out[:, 2, 4], out[:, 2, 5] = x, y, z
-    return out
-
-
 def momentum_map(track: Track) -> Array:
     """(N, 6, 10): linear and angular momentum (world axes, about the origin) per inertial parameter."""
     R = track.R_world_body
@@ -53,7 +43,7 @@ def momentum_map(track: Track) -> Array:
     out[:, :3, 1:4] = R @ skew(w)
     out[:, 3:, 0] = np.cross(x, v)
     out[:, 3:, 1:4] = skew(x) @ R @ skew(w) - skew(v) @ R
-    out[:, 3:, 4:] = R @ _products(w)
+    out[:, 3:, 4:] = R @ inertia_times(w)
     return out
 
 

@@ -142,3 +142,13 @@ def can_exist(elements: Array) -> bool:
         return False
     principal = np.linalg.eigvalsh(tensor(elements[4:]))
     return bool(principal[0] > 0.0 and principal[0] + principal[1] > principal[2])
+
+
+def inertia_times(v: Array) -> Array:
+    """(N, 3, 6): I v as a linear map of (xx, xy, xz, yy, yz, zz)."""
+    out = np.zeros((v.shape[0], 3, 6))
+    x, y, z = v.T
+    out[:, 0, 0], out[:, 0, 1], out[:, 0, 2] = x, y, z
+    out[:, 1, 1], out[:, 1, 3], out[:, 1, 4] = x, y, z
+    out[:, 2, 2], out[:, 2, 4], out[:, 2, 5] = x, y, z
+    return out

@@ -22,6 +22,7 @@ from rig_identification.check.consistency.motion import ACROSS, ORDINARY, TINY, 
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import SCALE
 from rig_identification.check.consistency.trajectory import Trajectory
+from rig_identification.model.body import inertia_times
 from rig_identification.rig import Rig
 from rig_identification.statics.balance import skew
 
@@ -106,17 +107,7 @@ def _inertial_map(at: Trajectory, gravity: float) -> Array:
     out[:, :3, 0] = proper
     out[:, :3, 1:4] = skew(change) + turning @ turning
     out[:, 3:, 1:4] = -skew(proper)
-    out[:, 3:, 4:] = _products(change) + turning @ _products(rate)
-    return out
-
-
-def _products(v: Array) -> Array:
-    """(N, 3, 6): I v per (xx, xy, xz, yy, yz, zz)."""
-    out = np.zeros((v.shape[0], 3, 6))
-    x, y, z = v.T
-    out[:, 0, 0], out[:, 0, 1], out[:, 0, 2] = x, y, z
-    out[:, 1, 1], out[:, 1, 3], out[:, 1, 4] = x, y, z
-    out[:, 2, 2], out[:, 2, 4], out[:, 2, 5] = x, y, z
+    out[:, 3:, 4:] = inertia_times(change) + turning @ inertia_times(rate)
     return out
 
 

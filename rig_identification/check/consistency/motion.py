@@ -109,23 +109,12 @@ class MotionModel:
         place = np.tile(self.position, (self.run.time.size, 1))
         return Trajectory(place, zero, zero, zero, zero, zero, self.R0)
 
-    def fit(self, values: Mapping[str, Array], about: Trajectory | None = None) -> MotionFit:
-        """Fit the motion to readings by device (N, width), linear about a trajectory, by default rest."""
-        at = about or self.at_rest()
-        blocks = self._blocks(at, values)
-        try:
-            change, constants = self.spline.solve(blocks)
-        except (np.linalg.LinAlgError, ValueError):  # a motion that has left every bound has no next step
-            return self.at(values, at)
-        left = {b.name: self.spline.left(b, change, constants[b.name]) for b in blocks}
-        return self._judged(blocks, left, self._moved(at, change))
-
     def once(self, values: Mapping[str, Array], about: Trajectory) -> MotionFit:
         """One step from a trajectory, judged where it ends."""
-        return self.at(values, self.fit(values, about).trajectory)
+        return self.at(values, self._stepped(self._blocks(about, values), about))
 
     def settled(self, values: Mapping[str, Array], about: Trajectory | None = None) -> MotionFit:
-        """The same, linearised anew about the motion that was found until it settles.
+        """Fit the motion to readings by device (N, width), linearised after each step until it settles.
 
         From rest a large swing is overshot at first: a step that doubles the cost or more is taken all the
         same, and the best motion of all is kept.

@@ -114,11 +114,3 @@ class Spline:
         blocks[:, 0] += np.diag(1.0 / self.away**2)
         band = blocks[:, self._block, self._row, np.arange(6)]
         return np.ascontiguousarray(np.moveaxis(band, 1, 0).reshape(24, 6 * self.count))
-
-    def left(self, block: Block, change: tuple[Array, Array, Array], constant: Array) -> Array:
-        """(N, w) what a change leaves of a block, its constants taken off."""
-        left = block.miss - constant
-        for slope, moved in zip(block.slopes, change, strict=True):
-            if slope is not None:
-                left = left - np.einsum("nwd,nd->nw", slope, moved)
-        return left

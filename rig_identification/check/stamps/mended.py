@@ -6,7 +6,8 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from rig_identification.check.stamps.streams import GROUND_TRUTH, Stream, streams
+from rig_identification.check.found import Found
+from rig_identification.check.stamps.streams import GROUND_TRUTH, Stream, streams, with_stamps
 from rig_identification.check.stamps.told import PRICE
 from rig_identification.raw import RawSession, Stamps
 
@@ -35,6 +36,21 @@ def groups(by_device: dict[str, list[Mended]]) -> list[frozenset[str]]:
     """Devices to tell of together: all that have the kind. Ground truth goes along, but not alone."""
     have = frozenset(by_device)
     return [have] if have - {GROUND_TRUTH} else []
+
+
+def undone(
+    session: RawSession,
+    mend: Callable[[Stream], Mended | None],
+    tell: Callable[[RawSession, frozenset[str], list[Mended]], Found],
+) -> tuple[Found, ...]:
+    """What ``mend`` makes of the session's streams, put into the session and told once for all devices."""
+    by_device = mended_streams(session, mend)
+    result = []
+    for devices in groups(by_device):
+        some = [one for device in sorted(devices) for one in by_device[device]]
+        session = with_stamps(session, {one.stream.key: one.stamps for one in some})
+        result.append(tell(session, devices, some))
+    return tuple(result)
 
 
 def names(some: Iterable[Mended]) -> list[str]:

@@ -6,8 +6,8 @@ import numpy as np
 
 from rig_identification.check.found import Found
 from rig_identification.check.stamps.lateness import late
-from rig_identification.check.stamps.mended import Mended, groups, mended_streams, names
-from rig_identification.check.stamps.streams import Stream, with_stamps
+from rig_identification.check.stamps.mended import Mended, names, undone
+from rig_identification.check.stamps.streams import Stream
 from rig_identification.check.stamps.told import found, owner, quantity, recordings_text
 from rig_identification.raw import RawSession
 
@@ -28,13 +28,7 @@ def find(session: RawSession) -> tuple[Found, ...]:
         }  # fmt: skip
         return Mended(stream, seen.stamps, seen.gain, facts)
 
-    by_device = mended_streams(session, mend)
-    result = []
-    for devices in groups(by_device):
-        some = [one for device in sorted(devices) for one in by_device[device]]
-        session = with_stamps(session, {one.stream.key: one.stamps for one in some})
-        result.append(_told(session, devices, some))
-    return tuple(result)
+    return undone(session, mend, _told)
 
 
 def _told(session: RawSession, devices: frozenset[str], some: list[Mended]) -> Found:
