@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, multivariate_normal
 
-from rig_identification.estimate.constancy import departure, log_predictive, shared_information
+from rig_identification.estimate.constancy import departure, log_predictive
+from rig_identification.model.definite import integrated_out
 
 PARAMETERS, STARTS, ROWS = 6, 4, 120
 
@@ -29,7 +30,7 @@ def linear_world(rng: np.random.Generator, moved: np.ndarray) -> tuple[np.ndarra
     run = SimpleNamespace(
         jacobian=np.concatenate([other, starts], axis=1), residual=measured - other @ fitted
     )
-    return shared_information(information, PARAMETERS), run
+    return integrated_out(information, PARAMETERS), run
 
 
 def test_where_the_model_holds_its_chance_is_even() -> None:
@@ -86,5 +87,5 @@ def test_a_start_that_leaves_no_trace_takes_nothing_away() -> None:
     traceless = np.zeros((PARAMETERS + 3, PARAMETERS + 3))
     traceless[: PARAMETERS + 2, : PARAMETERS + 2] = information
     np.testing.assert_allclose(
-        shared_information(traceless, PARAMETERS), shared_information(information, PARAMETERS), rtol=1e-9
+        integrated_out(traceless, PARAMETERS), integrated_out(information, PARAMETERS), rtol=1e-9
     )

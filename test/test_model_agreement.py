@@ -165,11 +165,15 @@ def test_refining_the_step_sixteenfolds_the_accuracy() -> None:
     assert errors[1] / errors[2] == pytest.approx(16.0, rel=0.25)
 
 
-@pytest.mark.parametrize("sample", [thesis_case_14(), trifilar(0.3)], ids=["case_14", "trifilar"])
-def test_elastic_cables_become_rigid_as_they_stiffen(sample: Sample) -> None:
+#: The drum is light: on stiffer cables it bounces faster than the steps resolve (substeps.FASTEST).
+@pytest.mark.parametrize(
+    ("sample", "stiffness"),
+    [(thesis_case_14(), [1e8, 1e9, 1e10]), (trifilar(0.3), [1e7, 3e7, 1e8])],
+    ids=["case_14", "trifilar"],
+)
+def test_elastic_cables_become_rigid_as_they_stiffen(sample: Sample, stiffness: list[float]) -> None:
     drive = exciting(21, 0.1)
     rigid = simulate(sample.model(rods=True), sample.start, drive).states[:, :3]
-    stiffness = np.array([1e8, 1e9, 1e10])
     apart = []
     for EA in stiffness:
         elastic = simulate(sample.model(axial_stiffness=EA, rods=True), sample.start, drive)

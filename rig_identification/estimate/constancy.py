@@ -50,16 +50,6 @@ class Departure:
         return max(1.0, self.statistic / max(1, self.directions))
 
 
-def shared_information(information: Array, size: int) -> Array:
-    """(size, size) information on the parameters with the start states integrated out.
-
-    Where dry hinges stop a motion some of them leave no trace, and count as integrated out already.
-    """
-    cross, starts = information[:size, size:], information[size:, size:]
-    lifted = np.linalg.solve(definite(starts), cross.T)
-    return np.asarray(information[:size, :size] - cross @ lifted)
-
-
 def _directions(fitted: Array, full: Linearised) -> tuple[Array, Array, Array]:
     """Of each generalised eigenvector u its l and u^T b, (p,) each, and the residual in the run's starts."""
     size = fitted.shape[0]
@@ -88,7 +78,7 @@ def log_predictive(fitted: Array, full: Linearised) -> float:
 def departure(name: str, fitted: Array, full: Linearised) -> Departure:
     """Of one held-out run.
 
-    fitted (p, p): the fit's :func:`shared_information`. full: the run linearised about the fit.
+    fitted (p, p): the fit's information with its starts integrated out. full: the run linearised there.
     """
     values, pulls, _ = _directions(fitted, full)
     compared = values > COMPARED

@@ -18,7 +18,7 @@ from scipy.linalg import solve_triangular
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, left_to_go
-from rig_identification.model.definite import definite
+from rig_identification.model.definite import definite, integrated_out
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
@@ -73,9 +73,7 @@ def data_information(problem: Problem, evaluation: Evaluation) -> Array:
     taken off. Local and in the elements themselves: that mass must be positive tells
     nothing here.
     """
-    full = evaluation.information
-    inner, cross, rest = full[:INERTIAL, :INERTIAL], full[:INERTIAL, INERTIAL:], full[INERTIAL:, INERTIAL:]
-    shared = inner - cross @ invert_information(rest) @ cross.T - np.diag(1.0 / problem.weak**2)
+    shared = integrated_out(evaluation.information, INERTIAL) - np.diag(1.0 / problem.weak**2)
     map_ = np.linalg.inv(problem.bench.parameters.elements_jacobian(evaluation.point.theta))
     return np.asarray(map_.T @ shared @ map_)
 

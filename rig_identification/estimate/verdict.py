@@ -14,13 +14,12 @@ from rig_identification.estimate.constancy import (
     Departure,
     departure,
     log_predictive,
-    shared_information,
 )
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, linearise_run
 from rig_identification.estimate.whiteness import Band, bands
-from rig_identification.model.definite import definite
+from rig_identification.model.definite import definite, integrated_out
 from rig_identification.result import Mismatch, ParameterEstimate
 
 if TYPE_CHECKING:
@@ -153,7 +152,7 @@ def hear(fitted: Fitted) -> Heard:
     departures: list[Departure] = []
     for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
         witnesses += residual_witnesses(run, linearised, linearised.residual)
-    shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
+    shared = integrated_out(fitted.evaluation.information, fitted.problem.bench.parameters.size)
     for run, full in _held_out(fitted):
         witnesses += residual_witnesses(run, full, predictive_residual(shared, full))
         departures.append(departure(run.recording.name, shared, full))
@@ -171,7 +170,7 @@ def _held_out(fitted: Fitted) -> Iterator[tuple[Run, Linearised]]:
 
 def held_out_densities(fitted: Fitted) -> dict[tuple[str, float], float]:
     """Log density (nats) of every held-out run after the fit, by its recording's name and its offset (s)."""
-    shared = shared_information(fitted.evaluation.information, fitted.problem.bench.parameters.size)
+    shared = integrated_out(fitted.evaluation.information, fitted.problem.bench.parameters.size)
     return {run.begins: log_predictive(shared, full) for run, full in _held_out(fitted)}
 
 

@@ -41,6 +41,19 @@ def definite(matrix: Array) -> Array:
     return np.asarray((unit + added * np.eye(diagonal.size)) * np.outer(scale, scale))
 
 
+def integrated_out(information: Array, kept: int) -> Array:
+    """(kept, kept) information on the first ``kept`` parameters, with all others integrated out.
+
+    It is the Schur complement, and the last block of the Cholesky factor of the matrix with the others
+    first. Taken as a difference it would lose its digits where those are known far better than the first.
+    """
+    order = np.roll(np.arange(information.shape[0]), -kept)
+    scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))[order]
+    unit = information[np.ix_(order, order)] / np.outer(scale, scale)
+    block = scale[-kept:, None] * np.linalg.cholesky(definite(unit))[-kept:, -kept:]
+    return np.asarray(block @ block.T)
+
+
 def _is_above(least: float, matrix: Array) -> bool:
     """Whether every pivot of a Cholesky factor lies above ``least``."""
     try:
