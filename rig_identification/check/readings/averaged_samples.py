@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 
 from rig_identification.check.found import Found
-from rig_identification.check.readings.averages_undone import undone
 from rig_identification.check.readings.channel_model import (
     FALSE_ALARM,
     Array,
@@ -27,12 +26,12 @@ from rig_identification.check.readings.channel_model import (
 from rig_identification.check.readings.moving_average import LEAST, Comb, candidates, comb, log_spectrum
 from rig_identification.check.readings.telling import (
     Spotted,
-    corrected,
     devices_of,
     listed,
     of_recordings,
     only,
     together,
+    told,
     where,
     without,
 )
@@ -67,11 +66,7 @@ def find(session: RawSession) -> tuple[Found, ...]:
     for (_, channel), recorded in channels_of(session):
         if channel in _AVERAGED:
             spotted += _spotted(recorded)
-    found: list[Found] = []
-    for group in together(spotted, tolerance=_SAME):
-        session = corrected(session, group)
-        found.append(Found(_fault(session, group), session))
-    return tuple(found)
+    return told(session, together(spotted, tolerance=_SAME), _fault)
 
 
 def _spotted(recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:
@@ -135,6 +130,9 @@ def _filled(column: Array) -> Array:
 
 
 def _undone(channel: RawChannel, samples: int, combs: list[Comb]) -> RawChannel:
+    # Its splines and sparse matrices are imported where there is an average to undo
+    from rig_identification.check.readings.averages_undone import undone
+
     values = np.array(channel.values)
     floor = float(np.median([one.floor for one in combs]))
     for kept in groups(channel).values():

@@ -25,13 +25,13 @@ from rig_identification.check.readings.channel_model import (
 )
 from rig_identification.check.readings.telling import (
     Spotted,
-    corrected,
     devices_of,
     listed,
     of_recordings,
     spans_of,
     start_ns,
     together,
+    told,
     where,
     without,
 )
@@ -64,11 +64,7 @@ _SHORTEST = 50
 def find(session: RawSession) -> tuple[Found, ...]:
     """Channels that freeze; the repeated samples are left out, all of them where nothing else is recorded."""
     spotted = [one for (_, _), recorded in channels_of(session) for one in _spotted(session, recorded)]
-    found: list[Found] = []
-    for group in _at_one_time(spotted):
-        session = corrected(session, group)
-        found.append(Found(_fault(session, group), session))
-    return tuple(found)
+    return told(session, _at_one_time(spotted), _fault)
 
 
 def _at_one_time(spotted: list[Spotted]) -> list[list[Spotted]]:

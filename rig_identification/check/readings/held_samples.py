@@ -25,11 +25,11 @@ from rig_identification.check.readings.channel_model import (
 )
 from rig_identification.check.readings.telling import (
     Spotted,
-    corrected,
     devices_of,
     listed,
     only,
     together,
+    told,
     where,
 )
 from rig_identification.examination import SetupFault
@@ -72,11 +72,7 @@ class _Changes:
 def find(session: RawSession) -> tuple[Found, ...]:
     """Channels whose samples are repeated; each keeps the first sample of every hold."""
     spotted = [one for (_, _), recorded in channels_of(session) for one in _spotted(session, recorded)]
-    found: list[Found] = []
-    for group in together(spotted, tolerance=_SAME_RATE):
-        session = corrected(session, group)
-        found.append(Found(_fault(session, group), session))
-    return tuple(found)
+    return told(session, together(spotted, tolerance=_SAME_RATE), _fault)
 
 
 def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:

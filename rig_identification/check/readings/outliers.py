@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import savgol_filter
+from scipy.ndimage import correlate1d, median_filter, uniform_filter1d
 
 from rig_identification.check.readings.channel_model import (
     Array,
@@ -25,6 +24,9 @@ from rig_identification.raw import RawChannel
 _MEDIAN = 9
 #: Samples and order of the polynomial that takes a signal's bends away before.
 _SMOOTH, _ORDER = 21, 3
+#: Weights of the samples around one that make such a polynomial's value at it (Savitzky and Golay).
+#: scipy.signal would give them, and take most of a second to import.
+_POLYNOMIAL = np.linalg.pinv((np.arange(_SMOOTH)[:, None] - _SMOOTH // 2.0) ** np.arange(_ORDER + 1))[0]
 #: The longest spike.
 _LONGEST = 3
 #: Noise is this many std off once in 1e15 samples, and once in 1e6 channels of 1e3 samples at 6.
@@ -110,7 +112,7 @@ def _noise(column: Array) -> float:
 def _bends_removed(column: Array) -> Array:
     """(n,) what is left of a column beside its running median, its slow bends taken away first."""
     calm = median_filter(column, _MEDIAN, mode="nearest")
-    flat = column - savgol_filter(calm, _SMOOTH, _ORDER, mode="nearest")
+    flat = column - correlate1d(calm, _POLYNOMIAL, mode="nearest")
     return np.asarray(flat - median_filter(flat, _MEDIAN, mode="nearest"))
 
 

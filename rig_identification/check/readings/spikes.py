@@ -9,20 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import bdtrc, xlogy
+from scipy.special import bdtrc
 
 from rig_identification.check.found import Found
-from rig_identification.check.readings.channel_model import Flags, channels_of, runs
+from rig_identification.check.readings.channel_model import Array, Flags, channels_of, runs
 from rig_identification.check.readings.outliers import OUTLIER, Outliers, outliers
 from rig_identification.check.readings.telling import (
     Spotted,
-    corrected,
     devices_of,
     listed,
     of_recordings,
     spans_of,
     start_ns,
     together,
+    told,
     where,
     without,
 )
@@ -43,11 +43,11 @@ _KINEMATIC = ("mocap", "exciter_shaft")
 
 @dataclass(frozen=True)
 class _Witnessed:
-    """The spikes of one channel in one recording."""
+    """The spikes of one channel in one recording, before the other devices that have outliers."""
 
-    seen: Flags  # (k,) whether another device has an outlier at the time of a spike
-    chance: float  # of that for any time
-    witnesses: bool  # whether there are other devices
+    seen: Flags  # (k, devices) whether the device has an outlier at the time of the spike
+    chance: Array  # (devices,) of that for any time
+    witnesses: bool  # whether there are other devices at all
 
 
 def find(session: RawSession) -> tuple[Found, ...]:
@@ -71,11 +71,7 @@ def find(session: RawSession) -> tuple[Found, ...]:
             spike = _unseen(own, one)
             if spike.any():
                 spotted.append(_spotted(channel, number, spike, own))
-    found: list[Found] = []
-    for group in together(spotted):
-        session = corrected(session, group)
-        found.append(Found(_fault(session, group), session))
-    return tuple(found)
+    return told(session, together(spotted), _fault)
 
 
 def _spotted(channel: RawChannel, number: int, spike: Flags, seen: Outliers) -> Spotted:
@@ -89,41 +85,46 @@ def _spotted(channel: RawChannel, number: int, spike: Flags, seen: Outliers) -> 
 def _witnessed(own: Outliers, others: list[Outliers]) -> _Witnessed:
     """Which spikes of a channel other devices see as well."""
     starts, ends = runs(own.spike)
-    seen, covered = np.zeros(len(starts), bool), 0.0
     middle = 0.5 * (own.time[starts] + own.time[ends - 1])
     length = max(float(np.ptp(own.time)), 1e-9)
+    seen, chance = [], []
     for other in others:
         events = np.sort(other.time[other.off > OUTLIER])
         if not len(events):
             continue
         reach = own.reach + other.reach
-        behind = np.clip(np.searchsorted(events, middle), 1, max(len(events) - 1, 1))
-        nearest = np.minimum(
-            np.abs(middle - events[np.minimum(behind, len(events) - 1)]), np.abs(middle - events[behind - 1])
-        )
-        seen |= nearest <= reach
-        covered += (float(np.sum(np.minimum(np.diff(events), 2.0 * reach))) + 2.0 * reach) / length
-    return _Witnessed(seen, min(covered, 1.0 - 1e-9), bool(others))
+        behind = np.searchsorted(events, middle)
+        before, after = events[np.maximum(behind - 1, 0)], events[np.minimum(behind, len(events) - 1)]
+        seen.append(np.minimum(np.abs(middle - before), np.abs(middle - after)) <= reach)
+        covered = float(np.sum(np.minimum(np.diff(events), 2.0 * reach))) + 2.0 * reach
+        chance.append(min(covered / length, 1.0 - 1e-9))
+    return _Witnessed(
+        np.array(seen, bool).reshape(len(seen), len(starts)).T, np.array(chance, float), bool(others)
+    )
 
 
 def _damaged(witnessed: list[_Witnessed]) -> bool:
-    """Whether others see no more of the spikes than by chance; of the body's blows they see nearly all."""
+    """Whether others see no more of the spikes than by chance; of the body's blows they see nearly all.
+
+    Each device sees a damaged sample by its own chance. A blow, in nine cases of ten, one of them sees for
+    certain, whichever it is, and the others by chance: that makes what is seen likelier by the mean of
+    seen / chance over the devices. So chance meetings of many devices with spikes do not add up to a blow.
+    """
     gain = 0.0
     for one in witnessed:
-        if one.witnesses and one.chance < _BLOWS_SEEN:
-            count, seen = len(one.seen), int(np.count_nonzero(one.seen))
-            gain += float(xlogy(seen, one.chance / _BLOWS_SEEN))
-            gain += float(xlogy(count - seen, (1.0 - one.chance) / (1.0 - _BLOWS_SEEN)))
+        if one.witnesses:
+            told = (one.seen / one.chance).sum(axis=1) / max(len(one.chance), 1)
+            gain -= float(np.sum(np.log(1.0 - _BLOWS_SEEN + _BLOWS_SEEN * told)))
     return bool(gain > _DOUBT)
 
 
 def _unseen(own: Outliers, one: _Witnessed) -> Flags:
     """(n,) the spikes without those that others see, where these are more than chance makes them."""
     spike = np.array(own.spike)
-    if bdtrc(np.count_nonzero(one.seen) - 1, len(one.seen), one.chance) <= _CHANCE:
-        for a, b in [
-            pair for pair, seen in zip(zip(*runs(spike), strict=True), one.seen, strict=True) if seen
-        ]:
+    seen: Flags = np.any(one.seen, axis=1)
+    by_any = 1.0 - float(np.prod(1.0 - one.chance))
+    if bdtrc(np.count_nonzero(seen) - 1, len(seen), by_any) <= _CHANCE:
+        for a, b in [pair for pair, known in zip(zip(*runs(spike), strict=True), seen, strict=True) if known]:
             spike[a:b] = False
     return np.asarray(spike)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig_identification.check.found import Found
 from rig_identification.check.readings.channel_model import Flags, runs
+from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 
 
@@ -58,6 +60,22 @@ def corrected(session: RawSession, spotted: Iterable[Spotted]) -> RawSession:
     for one in spotted:
         recordings[one.recording] = recordings[one.recording].with_channels(one.changed)
     return replace(session, recordings=tuple(recordings))
+
+
+def told(
+    session: RawSession,
+    groups: Iterable[list[Spotted]],
+    fault: Callable[[RawSession, list[Spotted]], SetupFault],
+) -> tuple[Found, ...]:
+    """One fault for each group, each with the session that those before it corrected.
+
+    fault: makes a group's sentences, from the session without what the group spotted.
+    """
+    found: list[Found] = []
+    for group in groups:
+        session = corrected(session, group)
+        found.append(Found(fault(session, group), session))
+    return tuple(found)
 
 
 def together(spotted: Sequence[Spotted], *, tolerance: float | None = None) -> list[list[Spotted]]:

@@ -9,6 +9,7 @@ noise makes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,12 +23,12 @@ from rig_identification.check.readings.channel_model import (
 )
 from rig_identification.check.readings.telling import (
     Spotted,
-    corrected,
     devices_of,
     listed,
     of_recordings,
     start_ns,
     together,
+    told,
     where,
 )
 from rig_identification.examination import SetupFault
@@ -77,9 +78,9 @@ def find(session: RawSession) -> tuple[Found, ...]:
                 spotted += [(column, out)] if out else []
     found: list[Found] = []
     for column in sorted({column for column, _ in spotted}):
-        for group in together([one for k, out in spotted if k == column for one in out], tolerance=_SAME):
-            session = corrected(session, group)
-            found.append(Found(_fault(session, group, column), session))
+        alike = together([one for k, out in spotted if k == column for one in out], tolerance=_SAME)
+        found += told(session, alike, partial(_fault, column=column))
+        session = found[-1].session
     return tuple(found)
 
 

@@ -22,13 +22,13 @@ from rig_identification.check.readings.channel_model import (
 )
 from rig_identification.check.readings.telling import (
     Spotted,
-    corrected,
     devices_of,
     listed,
     of_recordings,
     spans_of,
     start_ns,
     together,
+    told,
     where,
     without,
 )
@@ -53,11 +53,7 @@ def find(session: RawSession) -> tuple[Found, ...]:
         for number, channel in recorded:
             one = _spotted(channel, number, start_ns(session.recordings[number]))
             spotted += [one] if one is not None else []
-    found: list[Found] = []
-    for group in together(spotted):
-        session = corrected(session, group)
-        found.append(Found(_fault(session, group), session))
-    return tuple(found)
+    return told(session, together(spotted), _fault)
 
 
 def _spotted(channel: RawChannel, number: int, begun: int) -> Spotted | None:

@@ -56,9 +56,11 @@ def late(stream: Stream, tolerance: float) -> Late | None:
     if mean <= 0.0 or float(np.ptp(stream.stamps)) / SECOND > 3.0 * mean * len(times):
         return None  # stamps that jump are another kind's
     steps = np.diff(times)
-    if float(np.quantile(steps, 0.9) - np.quantile(steps, 0.1)) < tolerance:
-        return None
     short = steps < TOGETHER * mean
+    # Even steps are no jitter, unless most are short: of bursts longer than ten samples few steps lie between
+    even = float(np.quantile(steps, 0.9) - np.quantile(steps, 0.1)) < tolerance
+    if even and np.mean(short) <= _ORDINARY_TOGETHER:
+        return None
     gain = len(steps) * _relative_entropy(float(np.mean(short)), _ORDINARY_TOGETHER)
     rounding = resolution(stream.stamps)
     if gain > 0.0 and rounding > 0.3 * mean and np.median(steps[~short]) < 1.5 * max(mean, rounding):
