@@ -114,10 +114,10 @@ def on_arrival(stamps: Stamps) -> Stamps:
     return np.maximum.accumulate(stamps + np.round(late * SECOND).astype(np.int64))
 
 
-def in_bursts(stamps: Stamps) -> Stamps:
+def in_bursts(stamps: Stamps, wait: float = 0.016) -> Stamps:
     """Handed over every 16 ms or so, and once after 0.1 s, sample after sample 70 us apart."""
     rng = np.random.default_rng(len(stamps))
-    waits = 0.016 + 3e-4 * rng.normal(size=2000)
+    waits = wait + 3e-4 * rng.normal(size=2000)
     waits[300] = 0.1
     handovers = stamps[0] - SECOND // 100 + np.round(np.cumsum(waits) * SECOND).astype(np.int64)
     turn = np.searchsorted(handovers, stamps)
@@ -184,6 +184,17 @@ def test_a_logger_on_other_clock_is_told_once() -> None:
     assert fault.where["channel"] == "cable_1, cable_2, cable_3"
     assert fault.parameters["offset"] == {"value": 37.0, "std": 0.0, "unit": "s"}
     assert not errors(raw, corrected, topics[0]).any()
+
+
+@pytest.mark.parametrize("wait", [0.008, 0.064])
+def test_bursts_of_a_quick_device_are_undone(wait: float) -> None:
+    """Of long bursts nearly every step is as short as the others: even steps are not regular stamps."""
+    raw, cell = session(), "/rig/cable_2/wrench"
+    corrected, (fault,) = examined(with_fault(raw, lambda s: in_bursts(s, wait), (cell,)))
+    assert (fault.where["kind"], fault.where["channel"]) == ("usb_bursts", "cable_2")
+    late = errors(raw, corrected, cell)
+    assert np.ptp(late) < 2e-3
+    assert np.abs(late).max() < wait
 
 
 def test_messages_in_reverse_order_are_turned_round() -> None:

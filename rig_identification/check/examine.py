@@ -1,4 +1,7 @@
-"""The whole examination: stamps first, then each channel by itself, then channels against each other."""
+"""The whole examination: stamps first, then copies, each channel by itself, and channels against each other.
+
+Copies agree to the last bit, whatever else is wrong with them: what is wrong with the original is told once.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ class Examined:
 def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> Examined:
     """Examine a session. progress: called with one sentence before each stage."""
     session, faults = raw, list[SetupFault]()
-    for stage, package in (("stamps", stamps), ("readings", readings), ("copies", consistency)):
+    for stage, package in (("stamps", stamps), ("copies", consistency), ("readings", readings)):
         if progress is not None:
             progress(f"checking {stage}")
         for examiner in examiners(package):

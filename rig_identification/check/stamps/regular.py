@@ -21,14 +21,15 @@ from rig_identification.raw import Stamps
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Samples over which an envelope is taken: 20 handovers of 3 samples, of which one lies within a twentieth of
-#: an interval of the envelope with probability 1 - 0.95**20 = 2/3, and within a tenth of one with 0.9.
-_BLOCK = 64
+#: Handovers over which an envelope is taken: of 20 one lies within a twentieth of an interval of the envelope
+#: with probability 1 - 0.95**20 = 2/3, and within a tenth of one with 0.9. Samples at least: 20 times 3.
+_HANDOVERS, _BLOCK = 20, 64
 #: Loss is counted where the envelope rises by more than this part of an interval: it lies at most a tenth
 #: of an interval high (see _BLOCK), and the slope adds less than that over a block.
 _RISE = 0.75
-#: Samples at the end of a stream among which no loss is sought: an envelope needs several handovers.
-_TAIL = 24
+#: Handovers at the end of a stream, and samples at least, among which no loss is sought: an envelope needs
+#: several.
+_LAST, _TAIL = 8, 24
 #: First stretch over which an interval is sought, and how many of its best candidates are followed further.
 _STRETCH, _FOLLOWED = 512, 6
 #: Part of the samples that may be lost; a device that loses more has no rate to speak of.
@@ -94,14 +95,24 @@ def lossless_interval(times: Array) -> float | None:
     """Interval (s) of a stream that lost nothing, as its envelope shows; None where it is not straight."""
     count = np.arange(len(times))
     interval, start = _line(times, count)
-    lowest = _lowest(times - start - interval * count)
+    lowest = _lowest(times - start - interval * count, _block(times))
     # The lowest of 64 latencies lie within a tenth of an interval; a loss moves the line by half of one.
     return interval if float(np.ptp(lowest)) < 0.4 * interval else None
 
 
-def _lowest(rest: Array) -> Array:
+def _block(times: Array) -> int:
+    """Samples over which an envelope is taken."""
+    return max(_BLOCK, math.ceil(_HANDOVERS * _together(times)))
+
+
+def _together(times: Array) -> float:
+    """Samples of a handover, in the mean."""
+    return len(times) / (1 + float(np.count_nonzero(np.diff(times) > TOGETHER * mean_interval(times))))
+
+
+def _lowest(rest: Array, block: int) -> Array:
     """Lowest of each block of samples."""
-    edges = np.linspace(0, len(rest), max(len(rest) // _BLOCK, 1) + 1).astype(int)
+    edges = np.linspace(0, len(rest), max(len(rest) // block, 1) + 1).astype(int)
     return np.minimum.reduceat(rest, edges[:-1])
 
 
@@ -128,7 +139,7 @@ def _sought_interval(times: Array) -> float:
 def _index(times: Array, interval: float) -> Indices:
     count = np.arange(len(times))
     rest = times - interval * count
-    tail = max(len(times) - _TAIL, 0)
+    tail = max(len(times) - max(_TAIL, math.ceil(_LAST * _together(times))), 0)
     lowest = np.minimum.accumulate(rest[::-1])[::-1]
     lowest[tail:] = lowest[tail]  # too few samples follow to tell a rise from lateness
     lost = np.floor((lowest - lowest[0]) / interval + 1.0 - _RISE)
@@ -150,7 +161,7 @@ def _cost(times: Array, interval: float) -> float:
 
 def _line(times: Array, index: Indices) -> tuple[float, float]:
     """Interval and start of the line along the blocks' lowest samples."""
-    blocks = max(len(times) // min(_BLOCK, len(times)), 1)
+    blocks = max(len(times) // _block(times), 1)
     edges = np.linspace(0, len(times), blocks + 1).astype(int)
     rough = (times[-1] - times[0]) / max(int(index[-1] - index[0]), 1)
     rest = times - rough * index
