@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from rig_identification.rig import Rig
@@ -42,6 +41,8 @@ def rest_pose(rig: Rig, center_of_mass_body: Array) -> tuple[Array, Array]:
         R_world_body, position_world = pose(unknown)
         reach = position_world + points @ R_world_body.T - ceiling
         return np.asarray(lengths**2 - np.sum(reach**2, axis=1))
+
+    from scipy.optimize import minimize  # takes a tenth of a second: not where nothing is drawn
 
     first = np.concatenate([start[:3], np.zeros(3)])
     found = minimize(

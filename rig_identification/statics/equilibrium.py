@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from rig_identification.recording import Dummy
@@ -113,6 +112,8 @@ def _taut_after_descent(suspension: Suspension, arm: Array, turn: float) -> Indi
 
     def room(x: Array) -> Array:
         return suspension.length - spans(suspension, *placed(x))[2]
+
+    from scipy.optimize import minimize  # takes a tenth of a second: not for the balance of given poses
 
     found = minimize(
         height,

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from rig_identification.check.found import Found
+from rig_identification.check.readings.averages_undone import undone
 from rig_identification.check.readings.channel_model import (
     FALSE_ALARM,
     Array,
@@ -130,9 +131,6 @@ def _filled(column: Array) -> Array:
 
 
 def _undone(channel: RawChannel, samples: int, combs: list[Comb]) -> RawChannel:
-    # Its splines and sparse matrices are imported where there is an average to undo
-    from rig_identification.check.readings.averages_undone import undone
-
     values = np.array(channel.values)
     floor = float(np.median([one.floor for one in combs]))
     for kept in groups(channel).values():
