@@ -58,11 +58,32 @@ def draw_scene(seed: int, duration: float) -> Scene:
     """A clean scene: description right within the default tolerances, nothing left out."""
     rng = np.random.default_rng([seed, 1])
     name = str(rng.choice(GEOMETRIES))
-    geometry, body = _four_cables(rng, name) if name in CASES else _three_cables(rng, name)
+    geometry, body = draw_rig(rng, name)
+    return assemble(rng, seed, name, geometry, body, duration, held=len(geometry.length) == 4)
+
+
+def draw_rig(rng: np.random.Generator, name: str) -> tuple[Geometry, Body]:
+    """Hinges, cables and body of one of :data:`GEOMETRIES`."""
+    return _four_cables(rng, name) if name in CASES else _three_cables(rng, name)
+
+
+def assemble(
+    rng: np.random.Generator,
+    seed: int,
+    name: str,
+    geometry: Geometry,
+    body: Body,
+    duration: float,
+    held: bool,
+) -> Scene:
+    """A scene about a rig: devices, ordinary errors, description and plans.
+
+    ``held``: splayed cables leave the body two degrees of freedom or less; the runs pull harder.
+    """
     devices = _draw_devices(rng, geometry, body)
     errors = _draw_errors(rng, len(geometry.length))
     rig = _describe(rng, geometry, body, devices)
-    plans = _draw_plans(rng, body, geometry, duration)
+    plans = _draw_plans(rng, body, geometry, duration, held)
     level = np.array([*_normal(rng, DEFAULT_TOLERANCE["level"], 2), 0.0])
     geometry = replace(geometry, ceiling=Rotation.from_rotvec(level).apply(geometry.ceiling))
     return Scene(seed, name, rig, body, geometry, devices, errors, level, plans)
@@ -90,7 +111,7 @@ def _four_cables(rng: np.random.Generator, name: str) -> tuple[Geometry, Body]:
     # Lengths such that the level pose of the thesis fits: it is a start that the cables allow.
     length = np.linalg.norm(np.array(first) + hinge - ceiling, axis=1)
     cells = tuple(str(rng.choice(["ceiling", "body"], p=[0.8, 0.2])) for _ in range(4))
-    return Geometry(ceiling, hinge, length, cells), _draw_body(rng, mass, np.array(center), inertia)
+    return Geometry(ceiling, hinge, length, cells), draw_body(rng, mass, np.array(center), inertia)
 
 
 def _three_cables(rng: np.random.Generator, name: str) -> tuple[Geometry, Body]:
@@ -106,11 +127,11 @@ def _three_cables(rng: np.random.Generator, name: str) -> tuple[Geometry, Body]:
     shift = ceiling[0].copy()  # world's origin is the first ceiling point
     cells = tuple(str(rng.choice(["ceiling", "body"], p=[0.8, 0.2])) for _ in range(3))
     center = np.array([middle[0], middle[1], rng.uniform(-1.2, -0.5)])
-    body = _draw_body(rng, rng.uniform(850.0, 1400.0), center, (1550, 450, 1600, 50))
+    body = draw_body(rng, rng.uniform(850.0, 1400.0), center, (1550, 450, 1600, 50))
     return Geometry(ceiling - shift, hinge, length, cells), body
 
 
-def _draw_body(rng: np.random.Generator, mass: float, center: Array, inertia: tuple[float, ...]) -> Body:
+def draw_body(rng: np.random.Generator, mass: float, center: Array, inertia: tuple[float, ...]) -> Body:
     mass = mass * rng.uniform(0.85, 1.15)
     xx, yy, zz, yz = inertia
     scale = rng.uniform(0.88, 1.12, 3)
@@ -203,11 +224,10 @@ def _mount(rng: np.random.Generator, position: Array, rotation: Array, far: floa
 
 
 def _draw_plans(
-    rng: np.random.Generator, body: Body, geometry: Geometry, duration: float
+    rng: np.random.Generator, body: Body, geometry: Geometry, duration: float, splayed: bool
 ) -> tuple[Plan, ...]:
     dummy = np.round([*rng.uniform(0.1, 0.9, 2) * geometry.hinge[:, :2].max(axis=0), -0.25], 3)
     dummy_mass = float(np.round(0.045 * body.mass))
-    splayed = len(geometry.length) == 4
     first = "thesis" if splayed and rng.random() < 0.4 else "pull"
     plans = [
         Plan("static_bare", "static", 10.0),

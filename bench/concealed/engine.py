@@ -202,7 +202,8 @@ class Engine:
                 mujoco.mj_integratePos(self.model, back, move, -1.0)
                 jacobian[:, k] = (self._gap(forth) - self._gap(back)) / 2e-6
             move = np.zeros(self.model.nv)
-            move[:6] = -np.linalg.lstsq(jacobian, gap, rcond=None)[0]
+            # What nearly parallel cables, more than three, hardly hold stays where it is
+            move[:6] = -np.linalg.lstsq(jacobian, gap, rcond=1e-3)[0]
             mujoco.mj_integratePos(self.model, pose, move, 1.0)
             self.data.qpos[:] = pose
         return float(np.max(np.abs(gap)))

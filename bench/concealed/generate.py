@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from bench.concealed import truth as truths
 from bench.concealed.draw import draw_scene, scaled
-from bench.concealed.effects import choose, draw_effects
+from bench.concealed.effects import CATALOGUE, choose, draw_effects
 from bench.concealed.effects.base import Effect
+from bench.concealed.effects.cable_elasticity import CableElasticity
 from bench.concealed.effects.place import released_aside
 from bench.concealed.engine import Engine
+from bench.concealed.labs import INDETERMINATE, draw_lab_scene
 from bench.concealed.measure import device_samples, record
 from bench.concealed.scene import Plan, Scene
 from bench.concealed.signals import Trajectory
@@ -30,25 +32,34 @@ MOST_STRETCH = 1e-6  # m: faster motion asks more of the engine's rigid cables
 START_ACCURACY = 1e-4  # m/s^2 or rad/s^2, m from the level pose
 PROBE = 8.0  # s
 LEAST_RANGE = 0.035  # m, of the body origin
+ATTEMPTS = 12  # draws of a lab's rig and effects
+INDETERMINATE_SHARE = 0.5  # of the sessions whose cables stretch
+STIFFER = 4.0  # times: what stretch is compared with where cables must stretch
 
 
 def make_session(
-    seed: int, *, kind: str = "random", size: float | None = None, duration: float = 32.0
+    seed: int,
+    *,
+    kind: str = "random",
+    size: float | None = None,
+    duration: float = 32.0,
+    world: str = "first",
+    rig: str | None = None,
+    given: Mapping[str, Any] | None = None,
 ) -> tuple[Session, dict[str, Any]]:
     """A session and its truth.
 
     ``kind``: "clean", the name of an effect (two joined by "+": a pair), or "random".
     ``size``: 0 (faint) to 1 (strong); None draws it. ``duration`` of each run in s.
+    ``world``: "first" or "labs", where rigs and effects have the sizes and forms of labs. There ``rig`` names
+    one of the rigs, and ``given`` sets fields of the effects that have them, in SI units.
     The same arguments give the same session, bit for bit, on the same machine.
     """
-    rng = np.random.default_rng([seed, 3])
-    chosen = choose(rng, kind)
-    ideal = draw_scene(seed, duration)
-    if any(e.aside for e in chosen):
-        ideal = released_aside(ideal)
-    ideal, paths = calm_scene(ideal)
-    effects = draw_effects(rng, chosen, ideal, size)
-    scene, altered, effects = with_effects(ideal, paths, effects)
+    if world == "labs":
+        drawn = _labs(seed, kind, size, duration, rig, given or {})
+    else:
+        drawn = _first(seed, kind, size, duration)
+    scene, altered, effects = drawn.scene, drawn.altered, drawn.effects
     with_shaft = bool(np.random.default_rng([seed, 4]).random() < 0.5)
     recordings = tuple(
         record(path, scene, effects, plan, k, with_shaft)
@@ -56,13 +67,117 @@ def make_session(
     )
     session = Session(f"concealed_{seed}", scene.rig, recordings)
     truth = truths.describe(scene, effects, altered)
+    ideal, paths = drawn.ideal, drawn.paths
     if scene.plans is not ideal.plans:  # the effect asks for other runs: compare the same ones
         ideal = replace(ideal, plans=scene.plans)
-        paths = simulate(ideal, [])
-    truth["effect_over_noise"] = effect_over_noise(ideal, paths, scene, altered, effects)
-    if len(effects) > 1:
-        truth["alone_over_noise"] = [alone_over_noise(ideal, paths, effect) for effect in effects]
+        paths = simulate(ideal, drawn.base)
+    if not drawn.base:
+        truth["effect_over_noise"] = effect_over_noise(ideal, paths, scene, altered, effects)
+        if len(effects) > 1:
+            truth["alone_over_noise"] = [alone_over_noise(ideal, paths, effect) for effect in effects]
+        return session, truth
+    truth["effect_over_noise"], truth["alone_over_noise"] = _beside_stretch(ideal, paths, drawn)
     return session, truth
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a seed gave: the scene without and with its effects, and how each moves."""
+
+    ideal: Scene
+    paths: list[Trajectory]
+    scene: Scene
+    altered: list[Trajectory]
+    effects: list[Effect]
+    base: list[Effect]  # of the effects those without which the rig cannot be run
+
+
+def _first(seed: int, kind: str, size: float | None, duration: float) -> Drawn:
+    rng = np.random.default_rng([seed, 3])
+    chosen = choose(rng, kind)
+    ideal = draw_scene(seed, duration)
+    if any(e.aside for e in chosen):
+        ideal = released_aside(ideal)
+    ideal, paths = calm_scene(ideal)
+    effects = draw_effects(rng, chosen, ideal, size)
+    return Drawn(ideal, paths, *with_effects(ideal, paths, effects), base=[])
+
+
+def _labs(
+    seed: int, kind: str, size: float | None, duration: float, rig: str | None, given: Mapping[str, Any]
+) -> Drawn:
+    """As labs have it. A rig or effect that cannot be run is drawn again."""
+    for attempt in range(ATTEMPTS):
+        try:
+            return _lab(seed, kind, size, duration, rig, given, attempt)
+        except RuntimeError as error:
+            told = error
+    raise told
+
+
+def _lab(
+    seed: int,
+    kind: str,
+    size: float | None,
+    duration: float,
+    rig: str | None,
+    given: Mapping[str, Any],
+    attempt: int,
+) -> Drawn:
+    # Kind and rig are those of the seed, whatever the attempt.
+    rng = np.random.default_rng([seed, 6])
+    chosen = choose(rng, kind)
+    stretch = CATALOGUE["cable_elasticity"]
+    may = stretch in chosen and CATALOGUE["cable_slack"] not in chosen
+    if rig is None and may and rng.random() < INDETERMINATE_SHARE:
+        rig = str(rng.choice(INDETERMINATE))
+    base: list[Effect] = []
+    rng = np.random.default_rng([seed, 7, attempt])
+    if rig in INDETERMINATE:
+        chosen = [e for e in chosen if e is not stretch]
+        share = float(rng.uniform()) if size is None else size
+        base = [_given(CableElasticity.of_lab(rng, share), given)]
+    stiffness = base[0].axial_stiffness if base else None
+    ideal = draw_lab_scene(seed, duration, name=rig, stiffness=stiffness, attempt=attempt)
+    if base or any(e.aside for e in chosen):
+        ideal = released_aside(ideal)
+    ideal, paths = calm_scene(ideal, base)
+    effects = [_given(e, given) for e in draw_effects(rng, chosen, ideal, size, labs=True)]
+    drawn = Drawn(ideal, paths, *with_effects(ideal, paths, base + effects), base=base)
+    loose = min(path.tension.min() for path in drawn.altered) < PUSH
+    if loose and not any(e.lets_go for e in drawn.effects):
+        raise RuntimeError(f"seed {seed}: a cable goes slack beside {kind}")
+    return drawn
+
+
+def _given(effect: Effect, given: Mapping[str, Any]) -> Any:
+    """The effect with those of its fields that are ``given``."""
+    names = {f.name for f in fields(effect)} if is_dataclass(effect) else set()
+    values = {k: np.array(v, dtype=float) if isinstance(v, list) else v for k, v in given.items()}
+    return replace(effect, **{k: v for k, v in values.items() if k in names})
+
+
+def _beside_stretch(
+    ideal: Scene, paths: list[Trajectory], drawn: Drawn
+) -> tuple[dict[str, Any], list[dict[str, Any] | None]]:
+    """:func:`effect_over_noise` of all, and of each alone, where the cables must stretch.
+
+    No rigid cables could carry such a body: the stretch counts by what cables four times as stiff, set to the
+    same loads, would change.
+    """
+    base = drawn.base[0]
+    strain = paths[0].stretch[0] / ideal.geometry.length
+    loaded = ideal.geometry.length * (1.0 + strain)
+    stiff_scene = replace(ideal, geometry=replace(ideal.geometry, length=loaded / (1.0 + strain / STIFFER)))
+    stiff = simulate(stiff_scene, [base.stiffened(STIFFER)])
+    every = effect_over_noise(stiff_scene, stiff, drawn.scene, drawn.altered, drawn.effects)
+    alone: list[dict[str, Any] | None] = [effect_over_noise(stiff_scene, stiff, ideal, paths, [base])]
+    for effect in drawn.effects[1:]:
+        scene = effect.alter(ideal)
+        pair = [base, effect]
+        altered = simulate(scene, pair) if effect.mechanical else paths
+        alone.append(effect_over_noise(ideal, paths, scene, altered, pair))
+    return every, alone
 
 
 def with_effects(
@@ -102,41 +217,44 @@ def _released(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Engine:
     return engine
 
 
-def calm_scene(scene: Scene) -> tuple[Scene, list[Trajectory]]:
-    """Scale each run until its cables stay clear of slack and its motion is worth recording."""
+def calm_scene(scene: Scene, base: Sequence[Effect] = ()) -> tuple[Scene, list[Trajectory]]:
+    """Scale each run until its cables stay clear of slack and its motion is worth recording.
+
+    ``base``: effects without which the rig cannot be run.
+    """
     plans, paths = [], []
     for plan in scene.plans:
-        plan, path = _calm_run(scene, plan)
+        plan, path = _calm_run(scene, plan, base)
         plans.append(plan)
         paths.append(path)
     at_rest = (paths[0].position[0], Rotation.from_quat(paths[0].quaternion[0]).as_matrix())
     return replace(scene, plans=tuple(plans), at_rest=at_rest), paths
 
 
-def _calm_run(scene: Scene, plan: Plan) -> tuple[Plan, Trajectory]:
+def _calm_run(scene: Scene, plan: Plan, base: Sequence[Effect]) -> tuple[Plan, Trajectory]:
     if plan.kind == "static":
-        path = _simulate_one(scene, [], plan)
+        path = _simulate_one(scene, base, plan)
         if path.tension.min() < 0.0:
             # The engine's rigid cables would hold a body up that lies on them: no cable does
             raise RuntimeError(f"seed {scene.seed}, {plan.name}: at rest a cable would have to push")
         return plan, path
     for attempt in range(12):
-        engine = _released(scene, [], plan)
+        engine = _released(scene, base, plan)
         # The first seconds tell most; only what passes them is run in full.
-        share = _share(scene, engine.run(min(plan.duration, PROBE))) if attempt < 6 else 1.0
+        share = _share(scene, engine.run(min(plan.duration, PROBE)), base) if attempt < 6 else 1.0
         if share == 1.0:
             path = engine.run()
-            share = min(_share(scene, path), 1.0)
+            share = min(_share(scene, path, base), 1.0)
         if share == 1.0:
             return plan, path
         plan = scaled(plan, share)
     raise RuntimeError(f"seed {scene.seed}, {plan.name}: no fitting motion found")
 
 
-def _share(scene: Scene, path: Trajectory) -> float:
+def _share(scene: Scene, path: Trajectory, base: Sequence[Effect]) -> float:
     """By what to scale a run: 1 if it is good as it is."""
     weight = scene.body.mass * scene.rig.gravity
-    rigid = np.abs(path.stretch).max() < MOST_STRETCH
+    rigid = bool(base) or np.abs(path.stretch).max() < MOST_STRETCH
     if not rigid or path.tension.min() < LEAST_TENSION * weight or np.abs(path.rate).max() > MOST_RATE:
         return 0.6
     # Enough motion to tell an inertia.
@@ -180,6 +298,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--effect", default="random", help="clean, random, an effect's name, or NAME+NAME")
     parser.add_argument("--size", type=float, default=None, help="0 (faint) to 1 (strong)")
     parser.add_argument("--duration", type=float, default=32.0, help="of each run, s")
+    parser.add_argument("--world", default="first", choices=["first", "labs"])
+    parser.add_argument("--rig", default=None, help="in the world of labs: the rig's name")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="FIELD=JSON", help="of labs' effects, SI units"
+    )
     parser.add_argument("--storage", default="mcap", choices=["mcap", "sqlite3"])
     parser.add_argument("--compression", default="none", help="none, message, file or storage")
     parser.add_argument("--out", type=Path, required=True)
@@ -188,7 +311,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rig_identification.session import write_session
 
     session, truth = make_session(
-        options.seed, kind=options.effect, size=options.size, duration=options.duration
+        options.seed,
+        kind=options.effect,
+        size=options.size,
+        duration=options.duration,
+        world=options.world,
+        rig=options.rig,
+        given={k: json.loads(v) for k, _, v in (entry.partition("=") for entry in options.set)},
     )
     write_session(session, options.out, storage=options.storage, compression=options.compression)
     (options.out / "truth.json").write_text(json.dumps(truth, indent=1))

@@ -25,6 +25,12 @@ def add_point(body: Body, mass: float, position: Array) -> Body:
     return Body(total, center, inertia)
 
 
+def is_body(body: Body) -> bool:
+    """Whether matter can have this inertia: two principal moments exceed the third, by 5 % at least."""
+    principal = np.linalg.eigvalsh(body.inertia)
+    return bool(principal[0] > 0.0 and principal[0] + principal[1] > 1.05 * principal[2])
+
+
 def take_away(body: Body, part: Body) -> Body:
     """What is left of ``body`` without ``part``."""
     mass = body.mass - part.mass

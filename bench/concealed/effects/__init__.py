@@ -16,7 +16,7 @@ CLEAN_SHARE, PAIR_SHARE, OUTSIDE_SHARE = 1 / 3, 0.1, 0.15
 def _collect() -> dict[str, type[Effect]]:
     for module in pkgutil.iter_modules(__path__):
         importlib.import_module(f"{__name__}.{module.name}")
-    return {e.name: e for e in sorted(Effect.__subclasses__(), key=lambda e: e.name)}
+    return {e.name: e for e in sorted(Effect.__subclasses__(), key=lambda e: e.name) if not e.form}
 
 
 _ALL = _collect()
@@ -37,11 +37,18 @@ def choose(rng: np.random.Generator, kind: str) -> list[type[Effect]]:
 
 
 def draw_effects(
-    rng: np.random.Generator, chosen: list[type[Effect]], scene: Scene, size: float | None
+    rng: np.random.Generator,
+    chosen: list[type[Effect]],
+    scene: Scene,
+    size: float | None,
+    labs: bool = False,
 ) -> list[Effect]:
-    """The chosen effects, of random place and, if ``size`` is None, of random size."""
+    """The chosen effects, of random place and, if ``size`` is None, of random size.
+
+    ``labs``: sizes and forms as labs have them.
+    """
     sizes = [float(rng.uniform()) if size is None else size for _ in chosen]
-    return [effect.draw(rng, scene, s) for effect, s in zip(chosen, sizes, strict=True)]
+    return [(e.draw_lab if labs else e.draw)(rng, scene, s) for e, s in zip(chosen, sizes, strict=True)]
 
 
 def _names(rng: np.random.Generator, kind: str) -> list[str]:

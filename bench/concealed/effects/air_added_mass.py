@@ -25,6 +25,11 @@ class AirAddedMass(Effect):
         """In proportion to the body."""
         return cls(log_size(size, 0.001, 0.06) * scene.body.mass)
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> AirAddedMass:
+        """Up to 30 kg; a light body takes less air along."""
+        return cls(log_size(size, 1.0, min(30.0, 0.08 * scene.body.mass)))
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         return {"parameters": {"added_mass": quantity(self.added_mass, "kg")}}

@@ -46,11 +46,17 @@ class Effect:
     own_cables = False  # the effect replaces the rigid cables by its own
     stretches = False  # its cables do not keep their length
     lets_go = False  # its cables do not push
+    form = False  # another form of the effect of the same name, which draws it: not listed by itself
 
     @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, size: float) -> Effect:
         """One of random place; ``size`` from 0 (faint) to 1 (strong)."""
         raise NotImplementedError
+
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> Effect:
+        """One of the sizes and forms that labs have; where nothing else is said those of :meth:`draw`."""
+        return cls.draw(rng, scene, size)
 
     def truth(self) -> dict[str, Any]:
         """``where`` and ``parameters``, in the contract's words and units."""

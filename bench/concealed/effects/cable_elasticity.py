@@ -31,6 +31,20 @@ class CableElasticity(Effect):
         """From wire rope of a crane down to webbing."""
         return cls(log_size(size, 1e8, 1e6), float(np.exp(rng.uniform(np.log(0.003), np.log(0.05)))))
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> CableElasticity:
+        """See :meth:`of_lab`."""
+        return cls.of_lab(rng, size)
+
+    @classmethod
+    def of_lab(cls, rng: np.random.Generator, size: float) -> CableElasticity:
+        """Down to 0.5 MN."""
+        return cls(log_size(size, 5e7, 5e5), log_size(float(rng.uniform()), 0.003, 0.05))
+
+    def stiffened(self, times: float) -> CableElasticity:
+        """The same cables ``times`` as stiff."""
+        return CableElasticity(times * self.axial_stiffness, self.damping_ratio)
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         parameters = {

@@ -29,6 +29,11 @@ class CableMass(Effect):
         """From thin rope to heavy chain."""
         return cls(log_size(size, 0.1, 4.0))
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> CableMass:
+        """Up to a chain of 2 kg/m."""
+        return cls(log_size(size, 0.1, 2.0))
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         return {"parameters": {"linear_density": quantity(self.linear_density, "kg/m")}}

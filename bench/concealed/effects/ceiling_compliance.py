@@ -34,6 +34,12 @@ class CeilingCompliance(Effect):
         mass = scene.body.mass * rng.uniform(0.05, 0.5)
         return cls(int(rng.integers(3)), log_size(size, 3e7, 3e5), mass, rng.uniform(0.005, 0.05))
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> CeilingCompliance:
+        """Down to 0.3 MN/m."""
+        mass = scene.body.mass * rng.uniform(0.05, 0.5)
+        return cls(int(rng.integers(3)), log_size(size, 1e7, 3e5), mass, rng.uniform(0.005, 0.05))
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         parameters = {

@@ -29,6 +29,11 @@ class ExciterRotor(Effect):
         """From three doubts of the scale up."""
         return cls(log_size(size, 2.0, 50.0), scene.devices.exciter_position)
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> ExciterRotor:
+        """Up to 30 kg; a light body carries a light exciter."""
+        return cls(log_size(size, 2.0, min(30.0, 0.1 * scene.body.mass)), scene.devices.exciter_position)
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         parameters = {"rotor_mass": quantity(self.rotor_mass, "kg")}

@@ -25,6 +25,11 @@ class HingeDamping(Effect):
         """From a greased bearing to a rubber bush."""
         return cls(log_size(size, 0.1, 40.0))
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> HingeDamping:
+        """Up to a rubber bush of 50 N m s/rad."""
+        return cls(log_size(size, 0.3, 50.0))
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         return {"parameters": {"damping": quantity(self.damping, "N*m*s/rad")}}

@@ -27,6 +27,11 @@ class HingeFriction(Effect):
         """In proportion to the body's weight: friction is."""
         return cls(log_size(size, 1e-5, 1.5e-3) * scene.body.mass * scene.rig.gravity)
 
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> HingeFriction:
+        """Up to 20 N m; a light body rests in less."""
+        return cls(log_size(size, 0.1, min(20.0, 3e-3 * scene.body.mass * scene.rig.gravity)))
+
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
         return {"parameters": {"torque": quantity(self.torque, "N*m")}}

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
 from bench.concealed.effects.place import tank
-from bench.concealed.inertia import add_point
+from bench.concealed.inertia import add_point, is_body
 from bench.concealed.mechanism import give_mass
 from bench.concealed.scene import Array, Body, Plan, Scene
 
@@ -33,6 +33,16 @@ class LiquidSlosh(Effect):
         place = tank(rng, scene)
         mass = log_size(size, 0.0005, 0.05) * scene.body.mass
         damping = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05))))
+        return cls(mass, rng.uniform(0.5, 1.6), damping, place)
+
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> LiquidSlosh:
+        """From 5 to 100 kg, a quarter of the body at most."""
+        mass = log_size(size, 5.0, min(100.0, 0.25 * scene.body.mass))
+        damping = log_size(float(rng.uniform()), 0.005, 0.08)
+        place, middle = tank(rng, scene), scene.body.center_of_mass
+        while not is_body(add_point(scene.body, -mass, place)):
+            place = np.round(middle + 0.8 * (place - middle), 3)
         return cls(mass, rng.uniform(0.5, 1.6), damping, place)
 
     def truth(self) -> dict[str, Any]:

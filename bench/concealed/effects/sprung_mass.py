@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
 from bench.concealed.effects.place import tank
+from bench.concealed.effects.sprung_car import SprungCar
 from bench.concealed.inertia import add_point
 from bench.concealed.mechanism import give_mass
 from bench.concealed.scene import Array, Body, Plan, Scene
@@ -34,6 +35,11 @@ class SprungMass(Effect):
         mass = log_size(size, 0.001, 0.08) * scene.body.mass
         damping = float(np.exp(rng.uniform(np.log(0.005), np.log(0.08))))
         return cls(mass, rng.uniform(1.5, 7.0), damping, tank(rng, scene), int(rng.integers(3)))
+
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> SprungCar:
+        """A car on its springs."""
+        return SprungCar.draw(rng, scene, size)
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.concealed.effects.base import Effect, log_size, quantity
+from bench.concealed.effects.hose import Hose
 from bench.concealed.effects.place import hanging, tank
 from bench.concealed.scene import Array, Plan, Scene
 
@@ -34,6 +35,11 @@ class Tether(Effect):
         side = float(rng.choice([-1.0, 1.0]))
         wall = hanging(scene, place) + side * reach * np.eye(3)[axis]
         return cls(log_size(size, 5.0, 1500.0), place, axis, side, rng.uniform(0.08, 0.2), reach, wall)
+
+    @classmethod
+    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> Hose:
+        """A hose in any direction."""
+        return Hose.draw(rng, scene, size)
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
