@@ -197,6 +197,56 @@ def test_bursts_of_a_quick_device_are_undone(wait: float) -> None:
     assert np.abs(late).max() < wait
 
 
+@pytest.mark.parametrize("size", [0.05, 0.3, 20.0])
+def test_a_step_of_the_host_is_no_pause(size: float) -> None:
+    """Receipts step along: the values alone tell that no time went by; after a pause they are others."""
+    raw = session()
+    run = raw.recordings[0]
+    at = int(run.channels[0].stamp_ns[2000])
+
+    def on(stamps: Stamps) -> Stamps:
+        return stamps + np.where(stamps >= at, round(size * SECOND), 0)
+
+    stepped = tuple(replace(c, stamp_ns=on(c.stamp_ns), received_ns=on(c.received_ns)) for c in run.channels)
+    corrected, (fault,) = examined(
+        replace(raw, recordings=(replace(run, channels=stepped), raw.recordings[1]))
+    )
+    assert (fault.where["kind"], fault.where["channel"]) == ("clock_step", "all")
+    assert fault.parameters["offset"]["value"] == pytest.approx(size, abs=1e-3)
+    assert np.ptp(errors(raw, corrected)) < 1e-3
+
+    kept = (np.abs(c.stamp_ns - at - size / 2 * SECOND) > size / 2 * SECOND for c in run.channels)
+    paused = tuple(
+        replace(c, stamp_ns=c.stamp_ns[k], received_ns=c.received_ns[k], values=c.values[k])
+        for c, k in zip(run.channels, kept, strict=True)
+    )
+    assert examined(replace(raw, recordings=(replace(run, channels=paused), raw.recordings[1])))[1] == []
+
+
+@pytest.mark.parametrize(
+    ("shift", "kind"),
+    [(37.0, "leap_seconds"), (-7200.0, "leap_seconds"), (-START / SECOND + 20.0, "simulated_stamps")],
+)
+def test_devices_on_another_clock_than_the_recorder(shift: float, kind: str) -> None:
+    raw = with_fault(session(), lambda s: s + round(shift) * SECOND, tuple(DEVICES))
+    corrected, (fault,) = examined(raw)
+    assert (fault.where["kind"], fault.where["channel"]) == (kind, "all")
+    assert not errors(raw, corrected).any()
+
+
+@pytest.mark.parametrize("shifts", [(5000.0, 5000.0), (37.0, 1234.0), (900.0, 2700.0)])
+def test_bags_recorded_anew_from_others_are_ordinary(shifts: tuple[float, float]) -> None:
+    """A recorder of a replay receives at another time, each bag at its own."""
+    raw = session()
+    recordings = tuple(
+        replace(
+            r, channels=tuple(replace(c, received_ns=c.received_ns + round(s * SECOND)) for c in r.channels)
+        )
+        for r, s in zip(raw.recordings, shifts, strict=True)
+    )
+    assert examined(replace(raw, recordings=recordings))[1] == []
+
+
 def test_messages_in_reverse_order_are_turned_round() -> None:
     raw = session()
     run = raw.recordings[0]
@@ -221,7 +271,9 @@ def test_a_device_without_any_times_is_left_out() -> None:
     clean(corrected)
 
 
-@pytest.mark.parametrize("name", ["32 bits", "no leading zeros", "TAI", "since boot", "step back"])
+@pytest.mark.parametrize(
+    "name", ["32 bits", "no leading zeros", "TAI", "since boot", "step back", "step on", "a small step"]
+)
 def test_copies_of_the_stamps_for_receive_times_mislead_nobody(name: str) -> None:
     kind, fault, _ = FAULTS[name]
     raw = session()

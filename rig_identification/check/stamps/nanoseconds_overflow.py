@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig_identification.check.found import Found
-from rig_identification.check.stamps.common_clock import placement
+from rig_identification.check.stamps.common_clock import placement, received_together, steady
 from rig_identification.check.stamps.continuity import gain_of
 from rig_identification.check.stamps.mended import Mended, groups, mended_streams, names
 from rig_identification.check.stamps.regular import seconds, usual_interval
-from rig_identification.check.stamps.streams import FEWEST, SECOND, Stream, streams, with_stamps
+from rig_identification.check.stamps.streams import FEWEST, SECOND, Stream, copied, streams, with_stamps
 from rig_identification.check.stamps.told import found, owner, quantity, recordings_text
 from rig_identification.raw import RawSession, Stamps
 
@@ -129,12 +129,19 @@ def _anchored(session: RawSession, some: list[Mended]) -> RawSession:
         alone = next(s for s in streams(shifted, one.stream.place) if s.key == one.stream.key)
         placed = placement(alone, others, one.stream)
         period = int(one.facts["period"])
-        # With nothing to compare with they start in the first period after zero.
-        ahead = int(alone.stamps.min()) - 1 if placed is None else round(placed.offset * SECOND)
-        turns = ahead // period if placed is None else round(ahead / period)
+        ahead = _ahead(alone, here, one.stream, period) if placed is None else round(placed.offset * SECOND)
+        turns = round(ahead / period)
         stamps[one.stream.key] = one.stamps - turns * period
         session = with_stamps(session, {one.stream.key: stamps[one.stream.key]})
     return session
+
+
+def _ahead(alone: Stream, here: list[Stream], recorded: Stream, period: int) -> int:
+    """ns by which the first stream to be placed is ahead of its receipts, or of the first period."""
+    others = [other for other in here if other.key != alone.key]
+    if not copied(recorded.channel) and steady(alone) and received_together(alone, others):
+        return int(np.median(alone.stamps - alone.received))
+    return (int(alone.stamps.min()) - 1) // period * period
 
 
 def _told(session: RawSession, devices: frozenset[str], some: list[Mended]) -> Found:

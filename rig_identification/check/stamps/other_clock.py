@@ -17,7 +17,7 @@ from rig_identification.raw import RawSession, Stamps
 ORDER = 50
 
 #: s. TAI is ahead of UTC by this since 2017, GPS time since 2017, TAI of GPS time always.
-_SCALES = {37.0: "TAI", 18.0: "GPS time", 19.0: "TAI"}
+SCALES = {37.0: "TAI", 18.0: "GPS time", 19.0: "TAI"}
 _ZONE = 900.0  # s; time zones differ by quarters of an hour
 _LONGEST_ZONE = 14 * 3600.0
 #: s. An offset is one of the known ones where it lies this near: the latencies of two devices differ by less.
@@ -25,7 +25,7 @@ _NEAR = 0.5
 #: s. Both ends of a stream that overlaps the others' lie off by the same within this.
 _BOTH_ENDS = 0.1
 #: Stamps before this are no time of day: a clock that counts from its own start.
-_SINCE_START = 10**9 * SECOND // 3
+SINCE_START = 10**9 * SECOND // 3
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,10 @@ class _Off:
 def find(session: RawSession) -> tuple[Found, ...]:
     """Devices on another clock than most of their recording, put on the clock of the others."""
     alike: dict[tuple[str, str], list[_Off]] = defaultdict(list)
-    for place in range(len(session.recordings)):
-        for off in _apart(list(streams(session, place))):
-            alike[_kind(off), off.stream.device].append(off)
+    apart = [off for place in range(len(session.recordings)) for off in _apart(list(streams(session, place)))]
+    for off in apart:
+        start = min(int(o.stream.stamps.min()) for o in apart if o.stream.device == off.stream.device)
+        alike[_kind(off, start), off.stream.device].append(off)
     result = []
     for kind, some in _shared(alike):
         devices = frozenset(off.stream.device for off in some)
@@ -76,11 +77,10 @@ def _gain(off: _Off) -> float:
     return min(0.5 * (off.offset / (ORDINARY / 5.0)) ** 2, 50.0)
 
 
-def _kind(off: _Off) -> str:
-    """Word of the kind."""
+def _kind(off: _Off, start: int) -> str:
+    """Word of the kind. start: ns, the device's first stamp in the session."""
     if off.exact is not None:
         return "leap_seconds"
-    start = int(off.stream.stamps.min())
     return "simulated_stamps" if start < 60 * SECOND else "other_clock"
 
 
@@ -156,7 +156,7 @@ def _reference(groups: list[list[Stream]], delays: dict[tuple[int, str], float])
         # Of two clocks TAI or GPS time apart, the one ahead is on TAI or GPS time.
         for group in groups[1:]:
             off = _offset(largest[0], group, delays)
-            if off is not None and off.exact is not None and off.exact in _SCALES:
+            if off is not None and off.exact is not None and off.exact in SCALES:
                 return group
     return largest
 
@@ -173,7 +173,7 @@ def _by_receipt(stream: Stream, reference: list[Stream], delays: dict[tuple[int,
     if not steady(stream):
         return None  # a clock that steps or runs at another rate
     std = max(float(np.median(np.abs(usual - np.median(usual)))) * 1.5, 1e-3)
-    return _Off(stream, offset, std, _known(offset))
+    return _Off(stream, offset, std, known_offset(offset))
 
 
 def _by_ends(stream: Stream, reference: list[Stream]) -> _Off | None:
@@ -183,18 +183,18 @@ def _by_ends(stream: Stream, reference: list[Stream]) -> _Off | None:
     offset, std = (start + end) / 2.0, max(abs(end - start) / 2.0, 0.02)
     disjoint = abs(offset) > 2.0 * (last - first) / SECOND
     if abs(end - start) <= (ORDINARY if disjoint else _BOTH_ENDS):
-        return _Off(stream, offset, std, _known(offset))
+        return _Off(stream, offset, std, known_offset(offset))
     # One end lies outside of the recording, by an offset that puts the whole stream inside.
     outside = end if offset > 0 else start
-    exact = _known(outside)
+    exact = known_offset(outside)
     if exact is not None and start - exact > -ORDINARY and end - exact < ORDINARY:
         return _Off(stream, exact, std, exact)
     return None
 
 
-def _known(offset: float) -> float | None:
+def known_offset(offset: float) -> float | None:
     """The offset between scales of time, or between zones, that a measured one is near to."""
-    for scale in _SCALES:
+    for scale in SCALES:
         if abs(abs(offset) - scale) < _NEAR:
             return float(np.copysign(scale, offset))
     zone = round(offset / _ZONE) * _ZONE
@@ -217,12 +217,12 @@ def _told(session: RawSession, devices: frozenset[str], kind: str, some: list[_O
             "delay": quantity(0.0, std, "s"),
         },
         statement=statement,
-        advice=_ADVICE[kind],
+        advice=ADVICE[kind],
         gain=sum(map(_gain, main)),
     )  # fmt: skip
 
 
-_ADVICE = {
+ADVICE = {
     "leap_seconds": "Set the device or its driver to UTC, as the other devices' stamps are.",
     "other_clock": "Synchronize the device's clock with the recording computer's (NTP, PTP), or stamp its "
     "messages with the computer's clock.",
@@ -233,10 +233,10 @@ _ADVICE = {
 
 def _why(kind: str, offset: float, some: list[_Off]) -> str:
     if kind == "leap_seconds":
-        if abs(offset) in _SCALES:
-            return f": they are in {_SCALES[abs(offset)]}, not in UTC"
+        if abs(offset) in SCALES:
+            return f": they are in {SCALES[abs(offset)]}, not in UTC"
         return ": they are in another time zone"
     start = min(int(off.stream.stamps.min()) for off in some) / SECOND
     if kind == "simulated_stamps":
         return f": they start at {start:.3f} s, as with simulated time"
-    return ": the clock counts from its own start" if start < _SINCE_START / SECOND else ": another clock"
+    return ": the clock counts from its own start" if start < SINCE_START / SECOND else ": another clock"

@@ -22,12 +22,13 @@ _OUT_OF_ORDER = math.log(20.0)
 _LATENCY_CHANGE = 0.005
 #: s, std of the end of one stream against the others': a recorder stops for all at once, within an interval.
 _END = 0.05
-#: Moments at which the values' changes are taken to see how much is usual.
-_MOMENTS = 300
+#: Moments at which the values' changes are taken to see how much is usual, and how many of them must be away
+#: from jumps: three for each of some 20 columns.
+_MOMENTS, _FEWEST = 300, 60
 #: s; smaller steps are within what the fit takes for an offset between clocks, or a loss.
 _SMALLEST = 0.02
-#: Samples averaged on either side of a jump.
-_MEAN = 3
+#: s, and samples at least, on either side of a jump, from which a line is drawn to it.
+_SIDE, _LEAST = 0.03, 3
 #: Nats beyond which one source of evidence is not counted: its own model is not that sure.
 _CAP = 100.0
 
@@ -143,32 +144,50 @@ def _usual_end(outside: float, std: float, length: float) -> float:
 def by_values(jumps: list[Jump], length: float) -> float:
     """Nats for the values to go on over a jump as from one sample to the next, not as over ``length`` (s).
 
-    Changes of all columns over both are Gaussian, with the covariances that they have elsewhere in the
-    recording; what columns tell in common so counts once. At rest the two are alike and nothing is told.
+    Lines through the samples on either side miss each other at the jump. By how much is Gaussian, with the
+    covariances that it has elsewhere in the recording, with nothing and with ``length`` in between; what
+    columns tell in common so counts once. At rest the two are alike and nothing is told. Over more than half
+    of the recording values change as over half of it.
     """
     short, long, seen = [], [], []
+    even = np.ones(_MOMENTS, bool)
     low = max(float(j.stream.stamps.min()) for j in jumps)
     high = min(float(j.stream.stamps.max()) for j in jumps)
     for jump in jumps:
         columns = jump.stream.channel.values
         columns = columns[:, np.isfinite(columns).all(axis=0)]
-        size = round(length / jump.interval)
-        if (
-            not columns.shape[1]
-            or len(columns) < 2 * (size + 2 * _MEAN)
-            or not _MEAN < jump.after < len(columns) - _MEAN
-        ):
+        side = max(_LEAST, round(_SIDE / jump.interval))
+        size = min(round(length / jump.interval), len(columns) // 2 - side)
+        if not columns.shape[1] or size < 1 or not side <= jump.after <= len(columns) - side:
             continue
-        sums = np.concatenate((np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)))
-        mean = (sums[_MEAN:] - sums[:-_MEAN]) / _MEAN
         moments = np.linspace(low, high, _MOMENTS)
-        where = np.clip(np.searchsorted(jump.stream.stamps, moments), 0, len(mean) - size - _MEAN - 1)
-        short.append(mean[where + _MEAN] - mean[where])
-        long.append(mean[where + _MEAN + size] - mean[where])
-        seen.append(mean[jump.after] - mean[jump.after - _MEAN])
-    if not seen:
+        where = np.clip(np.searchsorted(jump.stream.stamps, moments), side, len(columns) - size - side)
+        for place in (where, where + size):
+            even &= _even(jump, place, side)
+        before = _drawn_on(columns, where, side, forwards=True)
+        short.append(_drawn_on(columns, where, side, forwards=False) - before)
+        long.append(_drawn_on(columns, where + size, side, forwards=False) - before)
+        at = np.array([jump.after])
+        ahead, back = (_drawn_on(columns, at, side, forwards=on)[0] for on in (True, False))
+        seen.append(back - ahead)
+    if not seen or np.count_nonzero(even) < _FEWEST:
         return 0.0
-    return float(np.clip(_ratio(np.hstack(short), np.hstack(long), np.concatenate(seen)), -_CAP, _CAP))
+    laws = np.hstack(short)[even], np.hstack(long)[even]
+    return float(np.clip(_ratio(*laws, np.concatenate(seen)), -_CAP, _CAP))
+
+
+def _even(jump: Jump, where: NDArray[np.int64], side: int) -> NDArray[np.bool_]:
+    """(k,) whether the samples about ``where`` follow each other, without a jump or a loss."""
+    steps = np.diff(jump.stream.stamps, prepend=jump.stream.stamps[0]) / SECOND
+    breaks = np.cumsum(np.abs(steps - jump.interval) > 2.0 * jump.interval)
+    return np.asarray(breaks[where + side - 1] == breaks[where - side])
+
+
+def _drawn_on(columns: Array, where: NDArray[np.int64], side: int, *, forwards: bool) -> Array:
+    """(k, width) values half a sample before ``where``, by lines through what comes before, or from there."""
+    offset = np.arange(-side, 0) if forwards else np.arange(side)
+    line = np.linalg.pinv(np.column_stack((np.ones(side), offset + 0.5)))[0]
+    return np.asarray(np.einsum("kiw,i->kw", columns[where[:, None] + offset], line))
 
 
 def _ratio(short: Array, long: Array, seen: Array) -> float:
