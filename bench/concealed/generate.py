@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,6 +19,7 @@ from bench.concealed.effects.base import Effect
 from bench.concealed.effects.cable_elasticity import CableElasticity
 from bench.concealed.effects.place import released_aside
 from bench.concealed.engine import Engine
+from bench.concealed.inertia import is_body
 from bench.concealed.labs import INDETERMINATE, draw_lab_scene
 from bench.concealed.measure import device_samples, record
 from bench.concealed.scene import Plan, Scene
@@ -34,6 +35,7 @@ PROBE = 8.0  # s
 LEAST_RANGE = 0.035  # m, of the body origin
 ATTEMPTS = 12  # draws of a lab's rig and effects
 INDETERMINATE_SHARE = 0.5  # of the sessions whose cables stretch
+SECOND_SHARE = 1 / 3  # of the seeds, by the second engine
 STIFFER = 4.0  # times: what stretch is compared with where cables must stretch
 
 
@@ -46,17 +48,21 @@ def make_session(
     world: str = "first",
     rig: str | None = None,
     given: Mapping[str, Any] | None = None,
+    engine: str = "mujoco",
 ) -> tuple[Session, dict[str, Any]]:
     """A session and its truth.
 
     ``kind``: "clean", the name of an effect (two joined by "+": a pair), or "random".
     ``size``: 0 (faint) to 1 (strong); None draws it. ``duration`` of each run in s.
     ``world``: "first" or "labs", where rigs and effects have the sizes and forms of labs. There ``rig`` names
-    one of the rigs, and ``given`` sets fields of the effects that have them, in SI units.
+    one of the rigs, ``given`` sets fields of the effects that have them, in SI units, and ``engine`` is "mujoco",
+    "exudyn", or "either": Exudyn for a third of the seeds, where it has the effects.
     The same arguments give the same session, bit for bit, on the same machine.
     """
     if world == "labs":
-        drawn = _labs(seed, kind, size, duration, rig, given or {})
+        drawn = _labs(seed, kind, size, duration, rig, given or {}, engine)
+    elif rig or given or engine != "mujoco":
+        raise ValueError("rig, given and engine are for the world of labs")
     else:
         drawn = _first(seed, kind, size, duration)
     scene, altered, effects = drawn.scene, drawn.altered, drawn.effects
@@ -67,6 +73,8 @@ def make_session(
     )
     session = Session(f"concealed_{seed}", scene.rig, recordings)
     truth = truths.describe(scene, effects, altered)
+    if world == "labs":
+        truth.update(world=world, engine=scene.engine)
     ideal, paths = drawn.ideal, drawn.paths
     if scene.plans is not ideal.plans:  # the effect asks for other runs: compare the same ones
         ideal = replace(ideal, plans=scene.plans)
@@ -78,6 +86,21 @@ def make_session(
         return session, truth
     truth["effect_over_noise"], truth["alone_over_noise"] = _beside_stretch(ideal, paths, drawn)
     return session, truth
+
+
+class Mover(Protocol):
+    """What an engine does."""
+
+    def __init__(self, scene: Scene, effects: Sequence[Effect], plan: Plan) -> None: ...
+
+    def release(self) -> float:
+        """Bring the body to the plan's start, at rest; return the residual of that start."""
+
+    def run(self, seconds: float | None = None) -> Trajectory:
+        """From the start, let the body move."""
+
+    def stand(self) -> Trajectory:
+        """Let the body hang at rest."""
 
 
 @dataclass(frozen=True)
@@ -104,12 +127,18 @@ def _first(seed: int, kind: str, size: float | None, duration: float) -> Drawn:
 
 
 def _labs(
-    seed: int, kind: str, size: float | None, duration: float, rig: str | None, given: Mapping[str, Any]
+    seed: int,
+    kind: str,
+    size: float | None,
+    duration: float,
+    rig: str | None,
+    given: Mapping[str, Any],
+    engine: str,
 ) -> Drawn:
     """As labs have it. A rig or effect that cannot be run is drawn again."""
     for attempt in range(ATTEMPTS):
         try:
-            return _lab(seed, kind, size, duration, rig, given, attempt)
+            return _lab(seed, kind, size, duration, rig, given, engine, attempt)
         except RuntimeError as error:
             told = error
     raise told
@@ -122,11 +151,13 @@ def _lab(
     duration: float,
     rig: str | None,
     given: Mapping[str, Any],
+    engine: str,
     attempt: int,
 ) -> Drawn:
     # Kind and rig are those of the seed, whatever the attempt.
     rng = np.random.default_rng([seed, 6])
     chosen = choose(rng, kind)
+    engine = _mover(rng, engine, chosen)
     stretch = CATALOGUE["cable_elasticity"]
     may = stretch in chosen and CATALOGUE["cable_slack"] not in chosen
     if rig is None and may and rng.random() < INDETERMINATE_SHARE:
@@ -139,15 +170,30 @@ def _lab(
         base = [_given(CableElasticity.of_lab(rng, share), given)]
     stiffness = base[0].axial_stiffness if base else None
     ideal = draw_lab_scene(seed, duration, name=rig, stiffness=stiffness, attempt=attempt)
-    if base or any(e.aside for e in chosen):
+    ideal = replace(ideal, engine=engine)
+    if base or engine != "mujoco" or any(e.aside for e in chosen):
         ideal = released_aside(ideal)
     ideal, paths = calm_scene(ideal, base)
     effects = [_given(e, given) for e in draw_effects(rng, chosen, ideal, size, labs=True)]
+    rigid = ideal.body
+    for effect in effects:
+        rigid = effect.rigid_part(rigid)
+    if not is_body(rigid):
+        raise RuntimeError(f"seed {seed}: nothing is left of the body beside {kind}")
     drawn = Drawn(ideal, paths, *with_effects(ideal, paths, base + effects), base=base)
     loose = min(path.tension.min() for path in drawn.altered) < PUSH
     if loose and not any(e.lets_go for e in drawn.effects):
         raise RuntimeError(f"seed {seed}: a cable goes slack beside {kind}")
     return drawn
+
+
+def _mover(rng: np.random.Generator, engine: str, chosen: Sequence[type[Effect]]) -> str:
+    lacking = [e.name for e in chosen if not e.in_second()]
+    if engine == "either":
+        return "exudyn" if rng.random() < SECOND_SHARE and not lacking else "mujoco"
+    if engine == "exudyn" and lacking:
+        raise ValueError(f"the second engine has no {lacking[0]}: leave it to MuJoCo")
+    return engine
 
 
 def _given(effect: Effect, given: Mapping[str, Any]) -> Any:
@@ -209,12 +255,21 @@ def _simulate_one(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Trajec
     return engine.run() if plan.kind == "dynamic" else engine.stand()
 
 
-def _released(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Engine:
-    engine = Engine(scene, effects, plan)
+def _released(scene: Scene, effects: Sequence[Effect], plan: Plan) -> Mover:
+    engine = _engine(scene.engine)(scene, effects, plan)
     residual = engine.release()
     if not residual < START_ACCURACY:
         raise RuntimeError(f"seed {scene.seed}, {plan.name}: start not found, residual {residual:.2g}")
     return engine
+
+
+def _engine(name: str) -> type[Mover]:
+    if name == "mujoco":
+        return Engine
+    # Imported here: who asks for MuJoCo's sessions alone needs no Exudyn.
+    from bench.concealed.second_engine import SecondEngine
+
+    return SecondEngine
 
 
 def calm_scene(scene: Scene, base: Sequence[Effect] = ()) -> tuple[Scene, list[Trajectory]]:
@@ -303,6 +358,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--set", action="append", default=[], metavar="FIELD=JSON", help="of labs' effects, SI units"
     )
+    parser.add_argument("--engine", default="mujoco", choices=["mujoco", "exudyn", "either"])
     parser.add_argument("--storage", default="mcap", choices=["mcap", "sqlite3"])
     parser.add_argument("--compression", default="none", help="none, message, file or storage")
     parser.add_argument("--out", type=Path, required=True)
@@ -317,6 +373,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         duration=options.duration,
         world=options.world,
         rig=options.rig,
+        engine=options.engine,
         given={k: json.loads(v) for k, _, v in (entry.partition("=") for entry in options.set)},
     )
     write_session(session, options.out, storage=options.storage, compression=options.compression)

@@ -26,9 +26,9 @@ def add_point(body: Body, mass: float, position: Array) -> Body:
 
 
 def is_body(body: Body) -> bool:
-    """Whether matter can have this inertia: two principal moments exceed the third, by 5 % at least."""
+    """Whether matter can have this inertia: two principal moments exceed the third, by 1 % at least."""
     principal = np.linalg.eigvalsh(body.inertia)
-    return bool(principal[0] > 0.0 and principal[0] + principal[1] > 1.05 * principal[2])
+    return bool(principal[0] > 0.0 and principal[0] + principal[1] > 1.01 * principal[2])
 
 
 def take_away(body: Body, part: Body) -> Body:

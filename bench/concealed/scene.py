@@ -128,4 +128,5 @@ class Scene:
     errors: SensorErrors
     level: Array  # (3,) rotation vector, rad: turns described ceiling points into true ones
     plans: tuple[Plan, ...]
+    engine: str = "mujoco"  # or "exudyn": what moves it
     at_rest: tuple[Array, Array] | None = None  # position (3,) and rotation (3, 3) of the body, hanging

@@ -20,16 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from bench.concealed.effects import CATALOGUE, OUTSIDE, draw_pair
-from bench.concealed.generate import make_session
+from bench.concealed.effects import CATALOGUE, OUTSIDE, SECOND, draw_pair
+from bench.concealed.generate import SECOND_SHARE, make_session
 
 CLEAN_SHARE, PAIR_SHARE, OUTSIDE_SHARE = 1 / 3, 0.1, 0.15
 
 
-def compose(seeds: Sequence[int], salt: str) -> list[dict[str, Any]]:
+def compose(seeds: Sequence[int], salt: str, world: str = "first") -> list[dict[str, Any]]:
     """Kind and size of every session: a third clean, some pairs, some outside, sizes evenly from 0 to 1.
 
-    The rest goes through the table in a random order, so that each effect has its turn.
+    The rest goes through the table in a random order, so that each effect has its turn. In the world of labs
+    the second engine moves a third of all, drawn from those whose effects it has.
     """
     rng = np.random.default_rng(int.from_bytes(hashlib.sha256(salt.encode()).digest()[:8], "big"))
     count = len(seeds)
@@ -39,10 +40,18 @@ def compose(seeds: Sequence[int], salt: str) -> list[dict[str, Any]]:
     kinds += _in_turn(rng, list(CATALOGUE), count - len(kinds))
     sizes = (rng.permutation(count) + rng.uniform(size=count)) / count
     order = rng.permutation(count)
-    return [
+    entries: list[dict[str, Any]] = [
         {"seed": int(seed), "kind": kinds[k], "size": float(sizes[k])}
         for seed, k in zip(seeds, order, strict=True)
     ]
+    if world == "labs":
+        able = [e for e in entries if e["kind"] == "clean" or set(e["kind"].split("+")) <= SECOND]
+        second = rng.permutation(len(able))[: round(SECOND_SHARE * count)]
+        for entry in entries:
+            entry.update(world=world, engine="mujoco")
+        for k in second:
+            able[k]["engine"] = "exudyn"
+    return entries
 
 
 def _in_turn(rng: np.random.Generator, names: list[str], count: int) -> list[str]:
@@ -56,7 +65,12 @@ def _made(entry: dict[str, Any], duration: float, sessions: Path | None) -> dict
     """One session, written to ``sessions``; its entry with its truth."""
     try:
         session, truth = make_session(
-            entry["seed"], kind=entry["kind"], size=entry["size"], duration=duration
+            entry["seed"],
+            kind=entry["kind"],
+            size=entry["size"],
+            duration=duration,
+            world=entry.get("world", "first"),
+            engine=entry.get("engine", "mujoco"),
         )
     except RuntimeError as error:  # this body with this effect cannot be run: one session less
         return {**entry, "duration": duration, "truth": None, "failed": str(error)}
@@ -75,6 +89,7 @@ def seal(
     duration: float = 32.0,
     sessions: Path | None = None,
     jobs: int = 1,
+    world: str = "first",
 ) -> str:
     """Write the truths of all sessions to ``path``; return its SHA-256 in hex.
 
@@ -86,7 +101,7 @@ def seal(
     if path.exists():
         begun = json.loads(path.read_text())
         salt, done = begun["salt"], {entry["seed"]: entry for entry in begun["sessions"]}
-    wanted = [entry for entry in compose(seeds, salt) if entry["seed"] not in done]
+    wanted = [entry for entry in compose(seeds, salt, world) if entry["seed"] not in done]
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         for future in as_completed([pool.submit(_made, entry, duration, sessions) for entry in wanted]):
             entry = future.result()
@@ -109,6 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--duration", type=float, default=32.0, help="of each run, s")
     parser.add_argument("--salt", default=None, help="default: drawn; give one to repeat a sealing")
     parser.add_argument("--sessions", type=Path, default=None, help="folder to write the sessions to")
+    parser.add_argument("--world", default="first", choices=["first", "labs"])
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args(arguments)
@@ -120,6 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.duration,
         options.sessions,
         options.jobs,
+        options.world,
     )
     print(f"seeds {seeds[0]} to {seeds[-1]}: SHA-256 {digest}")
     return 0

@@ -21,6 +21,8 @@ def _collect() -> dict[str, type[Effect]]:
 
 _ALL = _collect()
 CATALOGUE = {name: effect for name, effect in _ALL.items() if not effect.outside}
+#: What the second engine has.
+SECOND = frozenset(name for name, effect in _ALL.items() if effect.in_second())
 OUTSIDE = {name: effect for name, effect in _ALL.items() if effect.outside}
 
 

@@ -38,3 +38,7 @@ class AirAddedMass(Effect):
         """See :class:`Effect`."""
         air = spec.body("body").add_body(name="air", pos=scene.body.center_of_mass, gravcomp=1.0)
         give_mass(air, self.added_mass, np.zeros(3), 1e-9 * np.eye(3))
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        made.carry(self.added_mass, scene.body.center_of_mass, weighs=False)

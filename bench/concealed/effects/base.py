@@ -46,6 +46,7 @@ class Effect:
     own_cables = False  # the effect replaces the rigid cables by its own
     stretches = False  # its cables do not keep their length
     lets_go = False  # its cables do not push
+    lab_form: type[Effect] | None = None  # the form that labs have it in, if another
     form = False  # another form of the effect of the same name, which draws it: not listed by itself
 
     @classmethod
@@ -56,7 +57,7 @@ class Effect:
     @classmethod
     def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> Effect:
         """One of the sizes and forms that labs have; where nothing else is said those of :meth:`draw`."""
-        return cls.draw(rng, scene, size)
+        return (cls.lab_form or cls).draw(rng, scene, size)
 
     def truth(self) -> dict[str, Any]:
         """``where`` and ``parameters``, in the contract's words and units."""
@@ -76,6 +77,16 @@ class Effect:
 
     def build(self, spec: Any, scene: Scene, plan: Plan) -> None:
         """Add to the mechanism: bodies, springs, and the cables themselves if they are :attr:`own_cables`."""
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """Add to the second engine's mechanism, an :class:`~bench.concealed.assembly.Assembly`."""
+
+    @classmethod
+    def in_second(cls) -> bool:
+        """Whether the second engine has this effect as labs have it."""
+        own = cls.lab_form or cls
+        first = (own.build, own.ceiling, own.drive) != (Effect.build, Effect.ceiling, Effect.drive)
+        return own.assemble is not Effect.assemble or not first
 
     def tension(self, model: Any, data: Any, scene: Scene) -> Array | None:
         """(cables,) N at the load cells if the mechanism's cables are this effect's own, else None."""

@@ -66,6 +66,12 @@ class CableElasticity(Effect):
             tendon.wrap_site(f"ceiling_{i}")
             tendon.wrap_site(f"hinge_{i}")
 
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        g = scene.geometry
+        for cable in zip(g.ceiling, g.hinge, g.length, *self._constants(scene), strict=True):
+            made.elastic_cable(*cable)
+
     def tension(self, model: Any, data: Any, scene: Scene) -> Array:
         """See :class:`Effect`."""
         stiffness, damping = self._constants(scene)

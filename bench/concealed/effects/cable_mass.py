@@ -7,11 +7,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bench.concealed.effects.base import Effect, log_size, quantity
 from bench.concealed.effects.place import level_origin
 from bench.concealed.mechanism import CONSTRAINT_TIME, IMPEDANCE
-from bench.concealed.scene import Array, Plan, Scene
+from bench.concealed.scene import Array, Body, Plan, Scene
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,18 @@ class CableMass(Effect):
                 solref=[CONSTRAINT_TIME, 1.0],
                 solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
             )
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        origin, g = level_origin(scene), scene.geometry
+        for top, hinge, length, cell in zip(g.ceiling, g.hinge, g.length, g.load_cell, strict=True):
+            up = top - origin - hinge
+            turn = Rotation.align_vectors(up[None] / np.linalg.norm(up), [[0.0, 0.0, 1.0]])[0].as_matrix()
+            mass = self.linear_density * length
+            across = mass * length**2 / 12.0
+            # What it spins about itself with does not matter
+            inertia = np.diag([across, across, 1e-3 * across])
+            made.rod(top, hinge, Body(mass, np.array([0.0, 0.0, -0.5 * length]), inertia), turn, length, cell)
 
     def tension(self, model: Any, data: Any, scene: Scene) -> Array:
         """At the ceiling what the joint carries along the rod, at the body what the connection carries."""

@@ -63,3 +63,12 @@ class CeilingCompliance(Effect):
             damping=2.0 * self.damping_ratio * np.sqrt(self.stiffness * self.mass),
         )
         return plate
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        made.slide_ceiling(
+            self.mass,
+            self.axis,
+            self.stiffness,
+            2.0 * self.damping_ratio * np.sqrt(self.stiffness * self.mass),
+        )

@@ -43,3 +43,7 @@ class ExciterRotor(Effect):
         """See :class:`Effect`."""
         rotor = spec.body("body").add_body(name="rotor", pos=self.position)
         give_mass(rotor, self.rotor_mass, np.zeros(3), 1e-9 * np.eye(3))
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        made.carry(self.rotor_mass, self.position)

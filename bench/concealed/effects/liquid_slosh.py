@@ -67,3 +67,14 @@ class LiquidSlosh(Effect):
         damping = 2.0 * self.damping_ratio * circular * self.mass * length**2
         for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]):
             bob.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, damping=damping)
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        circular = 2.0 * np.pi * self.frequency
+        length = scene.rig.gravity / circular**2
+        origin, rotation = made.pose
+        bob = made.add_bob(self.mass, origin + rotation @ self.position)
+        made.hang(bob, self.position + np.array([0.0, 0.0, length]), length)
+        # A damper at the pivot, as one between the liquid and the tank's point where it rests
+        tank_point = made.point(made.body, self.position)
+        made.damp(bob, tank_point, 2.0 * self.damping_ratio * circular * self.mass)

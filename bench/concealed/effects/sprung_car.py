@@ -91,3 +91,16 @@ class SprungCar(Effect):
                 # Upright springs are set so that the mass is at its place when the body hangs level.
                 springref=scene.rig.gravity / circular**2 if axis == 2 else 0.0,
             )
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        circular = 2.0 * np.pi * self.frequency
+        part = Body(self.mass, np.zeros(3), np.diag(self.inertia))
+        sag = np.array([0.0, 0.0, scene.rig.gravity / circular[2] ** 2])
+        made.spring_part(
+            part,
+            self.position,
+            self.mass * circular**2,
+            2.0 * self.damping_ratio * circular * self.mass,
+            sag,
+        )

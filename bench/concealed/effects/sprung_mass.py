@@ -22,6 +22,7 @@ class SprungMass(Effect):
 
     name = "sprung_mass"
     mechanical = True
+    lab_form = SprungCar
     aside = True
     mass: float  # kg
     frequency: float  # Hz
@@ -35,11 +36,6 @@ class SprungMass(Effect):
         mass = log_size(size, 0.001, 0.08) * scene.body.mass
         damping = float(np.exp(rng.uniform(np.log(0.005), np.log(0.08))))
         return cls(mass, rng.uniform(1.5, 7.0), damping, tank(rng, scene), int(rng.integers(3)))
-
-    @classmethod
-    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> SprungCar:
-        """A car on its springs."""
-        return SprungCar.draw(rng, scene, size)
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""

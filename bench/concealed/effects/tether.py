@@ -19,6 +19,7 @@ class Tether(Effect):
 
     name = "tether"
     mechanical = True
+    lab_form = Hose
     stiffness: float  # N/m
     position: Array  # (3,) m, body
     axis: int  # it runs along this world axis while the body hangs at rest
@@ -35,11 +36,6 @@ class Tether(Effect):
         side = float(rng.choice([-1.0, 1.0]))
         wall = hanging(scene, place) + side * reach * np.eye(3)[axis]
         return cls(log_size(size, 5.0, 1500.0), place, axis, side, rng.uniform(0.08, 0.2), reach, wall)
-
-    @classmethod
-    def draw_lab(cls, rng: np.random.Generator, scene: Scene, size: float) -> Hose:
-        """A hose in any direction."""
-        return Hose.draw(rng, scene, size)
 
     def truth(self) -> dict[str, Any]:
         """See :class:`Effect`."""
