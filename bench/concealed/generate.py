@@ -55,8 +55,8 @@ def make_session(
     ``kind``: "clean", the name of an effect (two joined by "+": a pair), or "random".
     ``size``: 0 (faint) to 1 (strong); None draws it. ``duration`` of each run in s.
     ``world``: "first" or "labs", where rigs and effects have the sizes and forms of labs. There ``rig`` names
-    one of the rigs, ``given`` sets fields of the effects that have them, in SI units, and ``engine`` is "mujoco",
-    "exudyn", or "either": Exudyn for a third of the seeds, where it has the effects.
+    one of the rigs, ``given`` sets fields of the effects that have them, in SI units, and ``engine`` is
+    "mujoco", "exudyn", or "either": Exudyn for a third of the seeds, where it has the effects.
     The same arguments give the same session, bit for bit, on the same machine.
     """
     if world == "labs":
