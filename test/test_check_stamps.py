@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from session_samples import make_rig
 
 from rig_identification.check import stamps as kinds
@@ -195,6 +196,27 @@ def test_bursts_of_a_quick_device_are_undone(wait: float) -> None:
     late = errors(raw, corrected, cell)
     assert np.ptp(late) < 2e-3
     assert np.abs(late).max() < wait
+
+
+@pytest.mark.parametrize("poll", [0.008, 0.013, 0.032])
+def test_values_tell_a_polled_device_from_one_that_measures_at_ticks(poll: float) -> None:
+    """Both have the same stamps; what is measured at even times is off the motion at those of the polls."""
+    topic, ticks = "/rig/inclinometer/angles", round(poll * SECOND)
+
+    def polled(stamps: Stamps) -> Stamps:
+        return -(-stamps // ticks) * ticks
+
+    raw = session()
+    corrected, (fault,) = examined(with_fault(raw, polled, (topic,)))
+    assert (fault.where["kind"], fault.where["channel"]) == ("usb_bursts", "inclinometer")
+    assert np.std(errors(raw, corrected, topic)) < 1e-3
+    recordings = []
+    for recording in raw.recordings:
+        old = next(c for c in recording.channels if c.topic == topic)
+        stamps = polled(old.stamp_ns)
+        values = CubicSpline(old.stamp_ns - old.stamp_ns[0], old.values)(stamps - old.stamp_ns[0])
+        recordings.append(recording.with_channels(replace(old, stamp_ns=stamps, values=values)))
+    assert examined(replace(raw, recordings=tuple(recordings)))[1] == []
 
 
 @pytest.mark.parametrize("size", [0.05, 0.3, 20.0])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.check.stamps.polling import lattice, measured_evenly
 from rig_identification.check.stamps.regular import (
     TOGETHER,
     Grid,
@@ -77,6 +78,10 @@ def late(stream: Stream, tolerance: float) -> Late | None:
         interval = sought if gain <= 0.0 else None
     if agreement > _AGREEING:
         gain = max(gain, _one_sided(turns, rounding / mean))
+    apart = np.mean(short) < _ORDINARY_TOGETHER
+    slow = _polled_slowly(stream, fresh, 2.0 * (tolerance + rounding)) if apart else None
+    if slow is not None and slow.gain > gain:
+        return slow
     if gain <= 0.0:
         return None
     grid = envelope_grid(times, interval)
@@ -84,6 +89,26 @@ def late(stream: Stream, tolerance: float) -> Late | None:
     if high - low < 2.0 * (tolerance + rounding):
         return None
     return _on_grid(stream, fresh, grid, gain, short, steps)
+
+
+def _polled_slowly(stream: Stream, fresh: NDArray[np.bool_], least: float) -> Late | None:
+    """A stream on the lattice of a driver's polls, quicker than the device, whose values are even."""
+    times = seconds(stream.stamps)[fresh]
+    interval = rate_line(times, mean_interval(times))[0]
+    period, gain = lattice(times, interval, least)
+    if gain <= 0.0:
+        return None
+    index = np.arange(len(times))
+    rest = times - interval * index
+    # Each sample waits for the next poll, for half a period in the middle; a stall of the driver moves few
+    start = float(np.median(rest)) - 0.5 * period
+    grid = Grid(start, interval, index, rest - start)
+    if np.quantile(grid.late, 0.9) > 1.5 * period or np.min(grid.late) < -0.5 * period:
+        return None  # samples were lost: values do not tell
+    gain = min(gain, measured_evenly(stream.channel.values[fresh], grid.late, interval))
+    steps = np.diff(times)
+    late = _on_grid(stream, fresh, grid, gain, steps < TOGETHER * interval, steps)
+    return replace(late, handover=period, polled=True) if gain > 0.0 else None
 
 
 def resolution(stamps: Stamps) -> float:

@@ -181,13 +181,13 @@ def _slope(x: Array, y: Array) -> float:
     return float(np.median((y[half:] - y[: len(y) - half]) / (x[half:] - x[: len(x) - half])))
 
 
-def rate_line(times: Array) -> tuple[float, float]:
+def rate_line(times: Array, usual: float | None = None) -> tuple[float, float]:
     """Interval (s) at which the stamps' phases agree best, and how well: 1 perfectly, 0 not at all.
 
     The largest line of the stamps' spectrum within 6 % of one over the usual interval: losses of a tenth of
-    the samples move the median of jittering intervals by less.
+    the samples move the median of jittering intervals by less. usual: s, where that is known better.
     """
-    usual = usual_interval(times)
+    usual = usual_interval(times) if usual is None else usual
     span = float(times[-1] - times[0])
     width = usual / 8.0
     bins = int(span / width) + 1

@@ -15,7 +15,7 @@ ORDER = 70
 
 
 def find(session: RawSession) -> tuple[Found, ...]:
-    """Streams stamped in bursts at even times, put on the regular grid under them."""
+    """Streams stamped at hand-overs, in bursts or by a quick poll, put on the regular grid under them."""
     tolerance = session.rig.tolerance["clock"]
 
     def mend(stream: Stream) -> Mended | None:
@@ -36,6 +36,7 @@ def _told(session: RawSession, devices: frozenset[str], some: list[Mended]) -> F
     facts = {name: [one.facts[name] for one in some] for name in some[0].facts}
     together, steps = int(sum(facts["together"])), int(sum(facts["steps"]))
     handover = float(np.median(facts["handover"]))
+    close = f"{together:,} of {steps:,} intervals are shorter than a tenth of the sampling interval, and "
     return found(
         session, session, devices, "usb_bursts", where,
         parameters={
@@ -45,9 +46,8 @@ def _told(session: RawSession, devices: frozenset[str], some: list[Mended]) -> F
             "delay": quantity(0.0, max(facts["std"]), "s"),
         },
         statement=f"{owner(session, devices)} stamps are taken when a driver hands samples over, every "
-        f"{1e3 * handover:.3g} ms{recordings_text(session, where)}: {together:,} of {steps:,} intervals are "
-        "shorter than a tenth of the sampling interval, and samples wait for up to "
-        f"{1e3 * max(facts['stall']):.3g} ms.",
+        f"{1e3 * handover:.3g} ms{recordings_text(session, where)}: {close if together else ''}"
+        f"samples wait for up to {1e3 * max(facts['stall']):.3g} ms.",
         advice="Stamp each sample in the driver when the device measures it, or let the device's own counter "
         "stamp it; on a serial adapter set the latency timer to 1 ms.",
         gain=sum(one.gain for one in some),
