@@ -17,7 +17,7 @@ from rig_identification.check.consistency.faults.axes import signed_permutations
 from rig_identification.check.consistency.forces import ForceModel
 from rig_identification.check.consistency.motion import MotionModel, nats
 from rig_identification.check.consistency.reduced import PER_SPAN, ReducedSession, reduced
-from rig_identification.check.consistency.rest import _moved, fit_rest, square_with
+from rig_identification.check.consistency.rest import _moved, fit_rest, joined
 from rig_identification.check.consistency.rest_model import Loosened, RestModel
 from rig_identification.check.consistency.tracker import TrackerModel
 from rig_identification.check.consistency.trajectory import Trajectory
@@ -112,8 +112,9 @@ def test_readings_that_join_a_fit_cost_what_the_whole_fit_says(small: ReducedSes
     for loosened in (Loosened(), Loosened(gains=(name,))):
         whole = fit_rest(small.rig, high, loosened)
         assert whole is not None
-        joined = square_with(without, small.rig, high, cells, loosened)
-        assert joined == pytest.approx(whole.square, rel=0.2, abs=0.5)
+        first_order = joined(without, small.rig, high, cells, loosened)
+        assert first_order.square == pytest.approx(whole.square, rel=0.2, abs=0.5)
+        np.testing.assert_allclose(first_order.value("gain")[0], whole.value("gain")[0], atol=0.01)
 
 
 def test_motion_slopes_are_the_derivatives(small: ReducedSession) -> None:

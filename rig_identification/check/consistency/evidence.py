@@ -13,23 +13,23 @@ import numpy as np
 
 from rig_identification.check.consistency.forces import ForceModel
 from rig_identification.check.consistency.hypothesis import Hypothesis
+from rig_identification.check.consistency.measured import ORDINARY, Measured
 from rig_identification.check.consistency.motion import (
     INDEPENDENT,
-    ORDINARY,
     MotionFit,
     MotionModel,
     nats,
 )
 from rig_identification.check.consistency.reduced import Reduced, ReducedSession
-from rig_identification.check.consistency.rest import RestFit, fit_rest, square_with
+from rig_identification.check.consistency.rest import RestFit, fit_rest, joined
 from rig_identification.check.consistency.rest_model import Loosened
-from rig_identification.check.consistency.tracker import TrackerModel
+from rig_identification.check.consistency.tracker import TrackerModel, slanted
 from rig_identification.rig import Rig
 
 #: Runs looked at: a fault of the set-up shows in any.
 RUNS = 1
 #: Devices whose readings tell how the body moves.
-MOVING = frozenset(["imu", "imu.gyroscope", "imu.accelerometer", "inclinometer"])
+MOVING = frozenset(["imu", "imu.gyroscope", "imu.accelerometer", "inclinometer", "mocap"])
 #: Nats below which readings at rest agree: less than any fault costs.
 PRICELESS = 9.0
 
@@ -81,28 +81,36 @@ class Evidence:
             return self.plain.parts.get("rest", 0.0)
         return self.plain.cost - self.without(devices).cost
 
-    def judged(self, hypothesis: Hypothesis, thorough: bool = False) -> Account:
-        """The session under a hypothesis; unless thorough, to first order about it without its devices."""
+    def judged(self, hypothesis: Hypothesis, thorough: bool = False, most: float = np.inf) -> Account:
+        """The session under a hypothesis; unless thorough, to first order about it without its devices.
+
+        most: nats beyond which the account does not matter. It breaks off once it costs more.
+        """
         changed = hypothesis.change.reduced(self.session)
         fresh = thorough or hypothesis.fresh
         start = None if fresh else self.without(hypothesis.about)
         if start is None or start.rest is None:
             moved = bool(hypothesis.about & MOVING) or hypothesis.change.rig is not None
-            return self._account(changed, hypothesis.loosened, self.plain, moved)
+            spared = most - self._beside_rest(hypothesis.about)
+            return self._account(changed, hypothesis.loosened, self.plain, moved, spared)
         devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
-        recordings = changed.at_rest
         if hypothesis.about == {"imu.gyroscope"}:
-            square = self.plain.rest.square if self.plain.rest else start.rest.square
+            rest = self.plain.rest or start.rest
         else:
-            square = square_with(start.rest, changed.rig, recordings, devices, hypothesis.loosened)
-        parts = {"rest": self._rest_nats(square)}
+            rest = joined(start.rest, changed.rig, changed.at_rest, devices, hypothesis.loosened)
+        parts = {"rest": self._rest_nats(rest.square)}
         for k, run in enumerate(changed.runs[:RUNS]):
             motion = start.motions[k]
             if hypothesis.about & MOVING:
                 model = MotionModel(changed.rig, run, *start.rest.poses[0])
                 motion = model.once(run.values, motion.trajectory)
-            parts |= _parts(changed.rig, run, self._body(start), motion)
+            parts |= _parts(changed.rig, run, self._body(start), motion, rest)
         return Account(start.rest, start.motions, float(sum(parts.values())), parts)
+
+    def _beside_rest(self, about: frozenset[str]) -> float:
+        """Nats that motion, forces and tracker cost at least under a hypothesis about these devices."""
+        account = self.plain if "rest" in about else self.without(about)
+        return account.cost - account.parts.get("rest", 0.0)
 
     def _body(self, start: Account) -> RestFit:
         """The body at rest by all readings where they agree, else by those that a hypothesis leaves alone."""
@@ -121,16 +129,19 @@ class Evidence:
         loosened: Loosened | None = None,
         begun: Account | None = None,
         moved: bool = True,
+        most: float = np.inf,
     ) -> Account:
         """Evaluate a session from scratch.
 
         begun: another account, from whose motions a fit is tried as well. moved: whether the motion may
-        differ from those at all.
+        differ from those at all. most: nats at rest beyond which nothing else is looked at.
         """
         rest = fit_rest(session.rig, session.at_rest, loosened)
         if rest is None:
             return Account(None, (), float("inf"), {})
         parts = {"rest": self._rest_nats(rest.square)}
+        if parts["rest"] > most:
+            return Account(rest, (), float("inf"), parts)
         motions = []
         for k, run in enumerate(session.runs[:RUNS]):
             before = begun.motions[k] if begun is not None and begun.motions else None
@@ -166,13 +177,18 @@ def _best_motion(
     return min(judged, key=lambda pair: sum(pair[1].values()))
 
 
-def _parts(rig: Rig, run: Reduced, rest: RestFit, motion: MotionFit) -> dict[str, float]:
-    """Nats of one run's motion, forces and tracker."""
+def _parts(
+    rig: Rig, run: Reduced, rest: RestFit, motion: MotionFit, cells: RestFit | None = None
+) -> dict[str, float]:
+    """Nats of one run's motion, forces and tracker. cells: the fit at rest that tells the cells' gains."""
     parts = {f"{run.name}.{name}": value for name, value in motion.cost.items()}
     told = bool({"gyroscope", "accelerometer"} & motion.cost.keys())
     if told:
-        parts[f"{run.name}.forces"] = ForceModel(rig, motion.trajectory, rest).cost(run.values)[0]
-    if "mocap" in run.values:
+        parts[f"{run.name}.forces"] = ForceModel(rig, motion.trajectory, rest, cells).cost(run.values)[0]
+    if "mocap_turn" in motion.cost:
+        frame = Measured.of(rig).frame(run.values["mocap"], motion.trajectory.R0)
+        parts[f"{run.name}.mocap_up"] = 0.0 if frame is None else slanted(frame.as_matrix())
+    elif "mocap" in run.values:
         known = motion.trajectory if {"gyroscope", "accelerometer"} <= motion.cost.keys() else None
         tracker = TrackerModel(rig, *rest.poses[0], known)
         parts[f"{run.name}.mocap"] = tracker.cost(run.values["mocap"])

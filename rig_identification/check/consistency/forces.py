@@ -7,7 +7,8 @@ inertia I:
     moment   h x a + I w' + w x I w                    = sum b_i x T_i u_i + r_e x F
 
 Deviations from the run's mean alone are compared: zeros belong to rest. Ten numbers are fitted about
-the body that hangs at rest; what they leave is judged as any reading is (:mod:`motion`).
+the body that hangs at rest, and the cells' gains about those that rest tells, as closely as rest tells them.
+What they leave is judged as any reading is (:mod:`motion`).
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from rig_identification.check.consistency.motion import ACROSS, ORDINARY, TINY, nats
+from rig_identification.check.consistency.measured import ACROSS, ORDINARY, TINY
+from rig_identification.check.consistency.motion import nats
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import SCALE
-from rig_identification.check.consistency.trajectory import Trajectory
+from rig_identification.check.consistency.trajectory import Trajectory, rotation
 from rig_identification.model.body import inertia_times
 from rig_identification.rig import Rig
 from rig_identification.statics.balance import skew
@@ -32,12 +33,15 @@ Array = NDArray[np.float64]
 GYRATION, GUESSED = 0.35, 1.0
 #: Std of the centre of mass beyond what rest tells, share of the hinges' span.
 CENTER = 0.02
+#: A cell gives at least this share of the force that it measures: less is no gain, it is another cell.
+LEAST = 0.1
 
 
 class ForceModel:
     """Forces of one run beside the motion of a trajectory."""
 
-    def __init__(self, rig: Rig, at: Trajectory, rest: RestFit) -> None:
+    def __init__(self, rig: Rig, at: Trajectory, rest: RestFit, cells: RestFit | None = None) -> None:
+        """cells: the fit at rest that tells the cells' gains, where it is another than the body's."""
         self.rig, self.at = rig, at
         R = at.R
         hinges = np.array([c.body_point for c in rig.cables])
@@ -47,6 +51,9 @@ class ForceModel:
         self.lines = np.concatenate([unit, np.cross(hinges, unit)], axis=2)  # (N, n, 6)
         self.inertial = _inertial_map(at, rig.gravity)
         self.guess, self.guess_std = _guess(rig, hinges, rest)
+        gain, std = (cells or rest).value("gain")
+        self.share = 1.0 / np.maximum(1.0 + gain, LEAST)  # newtons that a newton read stands for
+        self.share_std = std * self.share**2
 
     def cost(self, values: Mapping[str, Array]) -> tuple[float, Array]:
         """Nats by which the forces disagree with the motion, and what is left of each (6,) in its own std.
@@ -58,23 +65,26 @@ class ForceModel:
         force = values.get("exciter")
         if any(t is None for t in tension) or (force is None and self.rig.exciter is not None):
             return 0.0, np.zeros(6)
-        pull = np.column_stack([t for t in tension if t is not None])
-        wrench = np.einsum("nc,ncw->nw", pull, self.lines)
+        pull = self.share * np.column_stack([t for t in tension if t is not None])
+        each = pull[:, :, None] * self.lines
+        wrench = each.sum(axis=1)
         if force is not None and self.rig.exciter is not None:
             wrench = wrench + force @ self._exciter_map()
         known = np.isfinite(wrench).all(axis=1)
         if np.count_nonzero(known) < 20:
             return 0.0, np.zeros(6)
-        return self._judged(wrench[known], self.inertial[known], pull[known])
+        # What a gain adds to the left-hand side, in shares of the force: slopes beside the ten numbers'
+        slope = np.concatenate([self.inertial[known], -np.swapaxes(each[known], 1, 2)], axis=2)
+        return self._judged(wrench[known], slope, pull[known])
 
     def _exciter_map(self) -> Array:
         """(3, 6) from a force in exciter axes to force and moment about the datum."""
         mount = self.rig.exciter
         assert mount is not None
-        turn = Rotation.from_quat(mount.orientation).as_matrix()
+        turn = rotation(mount)
         return np.asarray(np.concatenate([turn, skew(mount.position) @ turn]).T)
 
-    def _judged(self, wrench: Array, inertial: Array, pull: Array) -> tuple[float, Array]:
+    def _judged(self, wrench: Array, slope: Array, pull: Array) -> tuple[float, Array]:
         spread = np.std(pull, axis=0)
         whole = float(np.sqrt(np.mean(spread**2)))
         noise = self.rig.noise.get("tension", 0.0)
@@ -87,14 +97,15 @@ class ForceModel:
         )
         covariance += np.diag(ACROSS**2 * size + 1e-12)
         sharp = np.linalg.inv(np.linalg.cholesky(covariance))
-        slope = inertial - inertial.mean(axis=0)
-        rows = np.einsum("ij,njk->nik", sharp, slope).reshape(-1, 10)
-        miss = (deviation - slope @ self.guess) @ sharp.T
-        normal = rows.T @ rows + np.diag(1.0 / self.guess_std**2)
+        slope = slope - slope.mean(axis=0)
+        rows = (sharp @ slope).reshape(-1, slope.shape[2])
+        miss = (deviation - slope[:, :, :10] @ self.guess) @ sharp.T
+        doubt = np.concatenate([self.guess_std, self.share_std / self.share])
+        normal = rows.T @ rows + np.diag(1.0 / doubt**2)
         change = np.linalg.solve(normal, rows.T @ miss.reshape(-1))
         left = miss - (rows @ change).reshape(-1, 6)
         square = np.mean(left**2, axis=0)
-        belief = 0.5 * float(np.sum(np.log1p((change / self.guess_std) ** 2)))
+        belief = 0.5 * float(np.sum(np.log1p((change / doubt) ** 2)))
         sharpness = np.full(6, float(np.exp(np.mean(np.log(std / np.maximum(spread, TINY))))))
         return float(np.sum(nats(square, sharpness))) + belief, np.sqrt(square)
 

@@ -91,19 +91,39 @@ def proposals(evidence: Evidence) -> Iterator[Hypothesis]:
 
 def _weighed(evidence: Evidence) -> list[Weighed]:
     """The best hypotheses, evaluated thoroughly, best first."""
-    quick = [_weigh(evidence, h, thorough=False) for h in proposals(evidence)]
-    quick.sort(key=lambda w: -w.net)
+    quick = _compared(evidence)
     close = [w for w in quick[:FINALISTS] if w.net > quick[0].net - NEAR and w.net > -NEAR]
     final = [_weigh(evidence, w.hypothesis, thorough=True) for w in close]
     return sorted(final, key=lambda w: -w.net)
 
 
-def _weigh(evidence: Evidence, hypothesis: Hypothesis, thorough: bool) -> Weighed:
-    account = evidence.judged(hypothesis, thorough)
+def _compared(evidence: Evidence) -> list[Weighed]:
+    """Hypotheses weighed to first order, best first, but those that cannot come near the best or the price.
+
+    Those that might gain most come first, and among them those that take least time.
+    """
+    out: list[Weighed] = []
+    floor = -NEAR
+    hopes = [(evidence.bound(h.about) - _price(h), h) for h in proposals(evidence)]
+    for hope, hypothesis in sorted(hopes, key=lambda pair: (pair[1].fresh, -pair[0])):
+        if hope > floor:
+            out.append(_weigh(evidence, hypothesis, thorough=False, floor=floor))
+            floor = max(floor, out[-1].net - NEAR)
+    return sorted(out, key=lambda w: -w.net)
+
+
+def _price(hypothesis: Hypothesis) -> float:
+    """Nats that a hypothesis costs before any reading is looked at."""
+    return PRIOR + float(np.log(hypothesis.variants)) + NUMBER * hypothesis.free + hypothesis.penalty
+
+
+def _weigh(evidence: Evidence, hypothesis: Hypothesis, thorough: bool, floor: float = -np.inf) -> Weighed:
+    """floor: net nats below which the account does not matter."""
+    price = _price(hypothesis)
+    account = evidence.judged(hypothesis, thorough, evidence.plain.cost - price - floor)
     if account.rest is None:
         return Weighed(hypothesis, account, -np.inf, -np.inf)
     gain = evidence.plain.cost - account.cost
-    price = PRIOR + float(np.log(hypothesis.variants)) + NUMBER * hypothesis.free + hypothesis.penalty
     return Weighed(hypothesis, account, gain, gain - price)
 
 

@@ -140,13 +140,13 @@ def _fit_of(
     )  # fmt: skip
 
 
-def square_with(
+def joined(
     without: RestFit, rig: Rig, recordings: Sequence[Reduced], devices: frozenset[str], loosened: Loosened
-) -> float:
-    """Sum of squares once the readings of ``devices`` join a fit that did without them, to first order.
+) -> RestFit:
+    """A fit that did without the readings of ``devices`` once they join it, to first order; same poses.
 
     Readings that a fit predicts with covariance J C J' and that have noise of their own, 1 here, add
-    e' (1 + J C J')^-1 e.
+    e' (1 + J C J')^-1 e to the sum of squares.
     """
     model = RestModel(rig, recordings, loosened)
     covariance = without.covariance.copy()
@@ -164,11 +164,17 @@ def square_with(
         tension = without.unknown[model.columns["tension"]][k * n : (k + 1) * n]
         parts += model.readings_of(k, without.unknown, (position, R), tension, total)
     if not parts:
-        return without.square
+        return without
     miss, slope = np.concatenate([p[0] for p in parts]), np.vstack([p[1] for p in parts])
-    spread = np.eye(miss.size) + slope @ covariance @ slope.T
+    across = covariance @ slope.T
     # A fit without these readings may leave directions so open that rounding eats the 1
-    return without.square + float(miss @ np.linalg.pinv(spread, hermitian=True) @ miss)
+    inverse = np.linalg.pinv(np.eye(miss.size) + slope @ across, hermitian=True)
+    return replace(
+        without,
+        square=without.square + float(miss @ inverse @ miss),
+        unknown=without.unknown - across @ inverse @ miss,
+        covariance=covariance - across @ inverse @ across.T,
+    )
 
 
 def _expected(model: RestModel, tension: Array, pose: tuple[Array, Array]) -> dict[str, Array]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.reduced import Reduced
+from rig_identification.check.consistency.trajectory import rotation
 from rig_identification.recording import Dummy
 from rig_identification.rig import Rig
 from rig_identification.statics.balance import Suspension, balance, skew, spans
@@ -66,8 +67,8 @@ class RestModel:
         self.suspension = Suspension.of(rig)
         self.span = max(float(np.ptp(self.suspension.body, axis=0).max()), 1e-3)
         self.mass_guess = rig.mass or self._mass_of_tensions() or self.span
-        self.R_incl = _rotation(rig.inclinometer)
-        self.R_imu = _rotation(rig.imu)
+        self.R_incl = None if rig.inclinometer is None else rotation(rig.inclinometer)
+        self.R_imu = None if rig.imu is None else rotation(rig.imu)
         sizes = {"center": 3, "mass": 1, "pose": 6 * k, "tension": n * k, "gain": n, "zero": n}
         sizes |= {"length": n, "tilt": 2, "bias": 3, "dummy_mass": k, "dummy_place": 3 * k}
         edges = np.cumsum([0, *sizes.values()])
@@ -231,8 +232,3 @@ class RestModel:
         slope[:, self.columns["bias"]] = np.eye(3)
         error = g * self.R_imu.T @ up + x[self.columns["bias"]] - reading[0, 3:]
         return [(sharp * error, sharp * slope)]
-
-
-def _rotation(mount: object) -> Array | None:
-    orientation = getattr(mount, "orientation", None)
-    return None if orientation is None else np.asarray(Rotation.from_quat(orientation).as_matrix())

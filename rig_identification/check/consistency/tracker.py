@@ -1,8 +1,9 @@
 """How well a tracker's poses agree with the motion that the other devices tell, or with the cables alone.
 
-A tracker has a frame of its own, fixed to the room: any proper rotation of it is allowed, and the marker
-sits anywhere on the body unless its mount is described. With d the marker's displacement and q the body's
-turn from their means, in tracker axes, and R the tracker's attitude in the world:
+For a marker that is not described: it may sit anywhere on the body. (Where it is described, the poses are
+readings of the motion like any other, :mod:`measured`.) A tracker has a frame of its own, fixed to the room:
+any proper rotation of it is allowed. With d the marker's displacement and q the body's turn from their
+means, in tracker axes, and R the tracker's attitude in the world:
 
     other devices tell the motion     q = R q_w            d = R (x_w + q_w x m)
     cables alone                      u_i . (R' d) + (R' q) . ((a_i - m) x u_i) = 0
@@ -19,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.check.consistency.motion import ACROSS, INDEPENDENT, ORDINARY, TINY, nats
+from rig_identification.check.consistency.measured import ACROSS, FEWEST_POSES, ORDINARY, TINY, seen
+from rig_identification.check.consistency.motion import INDEPENDENT, nats
 from rig_identification.check.consistency.trajectory import Trajectory
 from rig_identification.rig import Rig
 from rig_identification.statics.balance import skew
@@ -47,8 +49,8 @@ class TrackerModel:
 
     def cost(self, poses: Array) -> float:
         """Nats by which poses (N, 7) disagree."""
-        known = np.asarray(np.isfinite(poses).all(axis=1))
-        if np.count_nonzero(known) < 20:
+        known = seen(poses)
+        if np.count_nonzero(known) < FEWEST_POSES:
             return 0.0
         poses = poses[known]
         d = poses[:, :3] - poses[:, :3].mean(axis=0)
@@ -56,9 +58,9 @@ class TrackerModel:
         middle = turns.mean()
         q = (turns * middle.inv()).as_rotvec()
         if self.motion is None:
-            return min(self._by_cables(d, q, R) for R in self._attitudes(middle, None, q))
+            return min(self._by_cables(d, q, R) for R in self._attitudes(None, q))
         x, w = self._world(known)
-        return min(self._by_motion(d, q, x, w, R) for R in self._attitudes(middle, w, q))
+        return min(self._by_motion(d, q, x, w, R) for R in self._attitudes(w, q))
 
     def _world(self, known: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Displacement of the datum and turn from their means, world axes."""
@@ -67,11 +69,8 @@ class TrackerModel:
         turns = Rotation.from_matrix(self.motion.R[known])
         return x - x.mean(axis=0), (turns * turns.mean().inv()).as_rotvec()
 
-    def _attitudes(self, middle: Rotation, w: Array | None, q: Array) -> list[Array]:
+    def _attitudes(self, w: Array | None, q: Array) -> list[Array]:
         """(3, 3) candidates of the tracker's attitude: world vectors into tracker axes."""
-        if self.rig.mocap is not None:
-            marker = Rotation.from_quat(self.rig.mocap.orientation)
-            return [(middle * marker.inv() * Rotation.from_matrix(self.R0).inv()).as_matrix()]
         headings = 2.0 * np.pi * np.arange(HEADINGS) / HEADINGS
         if w is None:
             ups = [
@@ -91,7 +90,7 @@ class TrackerModel:
         arm = self._arm_of(skew(w).reshape(-1, 3), (moved - x).reshape(-1))
         left = np.concatenate([moved - x - np.cross(w, arm), q @ R - w], axis=1)
         spread = np.concatenate([np.std(d @ R, axis=0), np.std(q @ R, axis=0)])
-        return self._nats(left, spread) + self._tilt(R)
+        return self._nats(left, spread) + slanted(R)
 
     def _by_cables(self, d: Array, q: Array, R: Array) -> float:
         """Nats for one attitude: what stretches the cables."""
@@ -104,15 +103,14 @@ class TrackerModel:
         arm = self._arm_of(rows.reshape(-1, 3), stretch.reshape(-1))
         left = stretch - rows @ arm
         whole = float(np.sqrt(np.mean(moved**2) + np.mean(turn**2) * np.mean(hinges**2)))
-        return self._nats(left, np.full(unit.shape[0], whole)) + self._tilt(R)
+        return self._nats(left, np.full(unit.shape[0], whole)) + slanted(R)
 
     def _arm_of(self, rows: Array, miss: Array) -> Array:
         span = max(float(np.ptp([c.body_point for c in self.rig.cables], axis=0).max()), 0.1)
-        about = np.zeros(3) if self.rig.mocap is None else self.R0 @ self.rig.mocap.position
-        reach = REACH * span if self.rig.mocap is None else 0.02 * span
+        reach = REACH * span
         std = ORDINARY * max(float(np.std(miss)), FLOOR[0])
         normal = rows.T @ rows / std**2 + np.eye(3) / reach**2
-        return about + np.linalg.solve(normal, rows.T @ (miss - rows @ about) / std**2)
+        return np.asarray(np.linalg.solve(normal, rows.T @ miss / std**2))
 
     def _nats(self, left: Array, spread: Array) -> float:
         floor = np.repeat(FLOOR, [3, left.shape[1] - 3]) if left.shape[1] == 6 else FLOOR[0]
@@ -122,7 +120,8 @@ class TrackerModel:
         std = np.sqrt(floor**2 + (ORDINARY * spread) ** 2 + (ACROSS * whole) ** 2)
         return float(np.sum(nats(np.mean(left**2, axis=0) / std**2, std / np.maximum(spread, TINY))))
 
-    def _tilt(self, R: Array) -> float:
-        """Nats by which a tracker's z axis is not up."""
-        tilt = float(np.arccos(np.clip(R[2, 2], -1.0, 1.0)))
-        return 0.5 * INDEPENDENT * float(np.log1p((tilt / LEVEL) ** 2))
+
+def slanted(R: Array) -> float:
+    """Nats by which a tracker's z axis is not up. R: (3, 3) world vectors into tracker axes."""
+    tilt = float(np.arccos(np.clip(R[2, 2], -1.0, 1.0)))
+    return 0.5 * INDEPENDENT * float(np.log1p((tilt / LEVEL) ** 2))

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.rig import Mount
+
 Array = NDArray[np.float64]
 
 
@@ -18,6 +20,11 @@ def cross(a: Array, b: Array) -> Array:
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return out
+
+
+def rotation(mount: Mount) -> Array:
+    """(3, 3) from a device's axes to the body's."""
+    return np.asarray(Rotation.from_quat(mount.orientation).as_matrix())
 
 
 @dataclass(frozen=True)

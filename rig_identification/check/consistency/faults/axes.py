@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
 from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.trajectory import rotation
 from rig_identification.examination import SetupFault
 from rig_identification.rig import Rig
 
@@ -61,7 +62,7 @@ def _likely_rates(evidence: Evidence) -> list[Array]:
     runs = [r for r in evidence.session.runs if "imu" in r.values]
     if rig.imu is None or not runs or not evidence.plain.motions:
         return []
-    R_imu = Rotation.from_quat(rig.imu.orientation).as_matrix()
+    R_imu = rotation(rig.imu)
     found = []
     for account in (evidence.without(frozenset(["imu.gyroscope"])), evidence.plain):
         rate = account.motions[0].trajectory.rate @ R_imu

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
 from rig_identification.check.consistency.rest import RestFit
+from rig_identification.check.consistency.trajectory import rotation
 from rig_identification.examination import SetupFault
 from rig_identification.rig import Rig
 
@@ -35,7 +35,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
     still = evidence.session.at_rest[0].values.get("imu")
     if still is None or not np.linalg.norm(still[0, 3:]) < NOTHING * rig.gravity:
         return
-    R_imu = Rotation.from_quat(rig.imu.orientation).as_matrix()
+    R_imu = rotation(rig.imu)
     at_rest = account.rest.expected[0]["imu"][None]
     missing: dict[str, Array] = {r.name: at_rest for r in evidence.session.recordings}
     yield Hypothesis(Change({"imu": _with(missing)}), _describe_level, about, variants=2)

@@ -6,16 +6,20 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.faults.axes import signed_permutations, written
 from rig_identification.check.consistency.faults.unit import LENGTHS
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
+from rig_identification.check.consistency.measured import Measured, seen
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.examination import SetupFault
 
 Array = NDArray[np.float64]
 ABOUT = frozenset(["mocap"])
+#: Permutations of the place alone that are tried of 47: those nearest to the motion that the others tell.
+LIKELY = 6
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
@@ -36,6 +40,67 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
     )  # fmt: skip
     for turn in signed_permutations(3):
         yield _axes(turn)
+    for turn in _likely_places(evidence):
+        yield _place_alone(turn)
+        if np.linalg.det(turn) > 0.0:
+            yield _turn_alone(turn.T)
+
+
+def _likely_places(evidence: Evidence) -> list[Array]:
+    """Permutations of a tracker's place that bring it nearest to the motion without it.
+
+    Its attitudes tell how the tracker's frame lies in the room, where the marker is described.
+    """
+    rig, account = evidence.session.rig, evidence.without(ABOUT)
+    runs = [r for r in evidence.session.runs if "mocap" in r.values]
+    if rig.mocap is None or not runs or not account.motions:
+        return []
+    at, poses = account.motions[0].trajectory, runs[0].values["mocap"]
+    frame = Measured.of(rig).frame(poses, at.R0)
+    if frame is None or len(at.position) != len(poses):
+        return []
+    known = seen(poses)
+    moved = frame.apply((at.position + at.R @ rig.mocap.position)[known])
+    moved, place = moved - moved.mean(axis=0), poses[known, :3] - poses[known, :3].mean(axis=0)
+    miss = [float(np.mean((place @ turn.T - moved) ** 2)) for turn in signed_permutations(3)]
+    return [signed_permutations(3)[k] for k in np.argsort(miss, kind="stable")[:LIKELY]]
+
+
+def _place_alone(turn: Array) -> Hypothesis:
+    def right(poses: Array, _: str) -> Array:
+        return np.concatenate([poses[:, :3] @ turn.T, poses[:, 3:]], axis=1)
+
+    def describe(rest: RestFit | None) -> SetupFault:
+        names = ", ".join(f"{axis} = {source}" for axis, source in zip("xyz", written(turn), strict=True))
+        return fault(
+            "axes",
+            {"channel": "mocap", "part": "position", "permutation": written(turn)},
+            {},
+            "The tracker's positions are in other axes than its orientations.",
+            f"Publish positions as {names} of what is published now.",
+        )
+
+    return Hypothesis(Change({"mocap": right}), describe, ABOUT, variants=47)
+
+
+def _turn_alone(turn: Array) -> Hypothesis:
+    def right(poses: Array, _: str) -> Array:
+        known, quaternions = seen(poses), poses[:, 3:].copy()
+        turned = Rotation.from_matrix(turn) * Rotation.from_quat(quaternions[known])
+        quaternions[known] = turned.as_quat()
+        return _turned(poses, quaternions)
+
+    def describe(rest: RestFit | None) -> SetupFault:
+        names = ", ".join(f"{axis} = {source}" for axis, source in zip("xyz", written(turn), strict=True))
+        return fault(
+            "axes",
+            {"channel": "mocap", "part": "orientation", "permutation": written(turn)},
+            {},
+            "The tracker's orientations are in other axes than its positions.",
+            f"Turn the orientations into the positions' frame: {names} of what is published now.",
+        )
+
+    return Hypothesis(Change({"mocap": right}), describe, ABOUT, variants=23)
 
 
 def _turned(poses: Array, quaternions: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,12 +41,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
             yield _device((cell,), slice(None), "tension", "N", unit, factor, frozenset(cells))
         yield _device(("exciter",), slice(None), "force", "N", unit, factor, frozenset(["exciter"]))
     yield from _counts(evidence, cells)
-    for unit, factor in ACCELERATIONS.items():
-        about = frozenset(["imu.accelerometer"])
-        yield _device(("imu",), slice(3, 6), "specific force", "m/s^2", unit, factor, about)
-    for unit, factor in RATES.items():
-        about = frozenset(["imu.gyroscope"])
-        yield _device(("imu",), slice(0, 3), "angular rate", "rad/s", unit, factor, about)
+    yield from _imu()
     for unit, factor in ANGLES.items():
         yield _device(
             ("inclinometer",), slice(None), "angles", "rad", unit, factor, frozenset(["inclinometer"])
@@ -85,6 +81,35 @@ def _device(
         )
 
     return Hypothesis(change, describe, about, variants=len(FORCES))
+
+
+def _imu() -> Iterator[Hypothesis]:
+    """Units of the IMU's two halves, one or both in a driver's own: g and degrees per second go together."""
+    force, rate = frozenset(["imu.accelerometer"]), frozenset(["imu.gyroscope"])
+    for unit, factor in ACCELERATIONS.items():
+        yield _device(("imu",), slice(3, 6), "specific force", "m/s^2", unit, factor, force)
+    for unit, factor in RATES.items():
+        yield _device(("imu",), slice(0, 3), "angular rate", "rad/s", unit, factor, rate)
+    for (unit, factor), (other, share) in product(ACCELERATIONS.items(), RATES.items()):
+        yield _both_halves(unit, factor, other, share)
+
+
+def _both_halves(force: str, factor: float, rate: str, share: float) -> Hypothesis:
+    def describe(rest: RestFit | None) -> SetupFault:
+        return fault(
+            "unit",
+            {"channel": "imu", "quantity": ["specific_force", "angular_rate"], "unit": [force, rate]},
+            {"factor": (factor, 0.0, f"m/s^2 per {force}"), "rate_factor": (share, 0.0, f"rad/s per {rate}")},
+            f"The IMU is recorded in {force} and {rate}, not in m/s^2 and rad/s.",
+            f"Multiply the specific force by {factor:.6g} and the angular rate by {share:.6g} in the driver.",
+        )
+
+    factors = np.repeat([share, factor], 3)
+    # Without any IMU the motion may be unknown, and a first-order step from there tells nothing
+    return Hypothesis(
+        Change({"imu": lambda values, _: values * factors}), describe, frozenset(["imu"]),
+        variants=len(ACCELERATIONS) * len(RATES), fresh=True,
+    )  # fmt: skip
 
 
 def _counts(evidence: Evidence, cells: list[str]) -> Iterator[Hypothesis]:
