@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from rig_identification.check.found import Found
 from rig_identification.check.stamps.continuity import gain_of
-from rig_identification.check.stamps.mended import Mended, groups, mended_streams, names
+from rig_identification.check.stamps.mended import Mended, names, undone
 from rig_identification.check.stamps.regular import mean_interval, seconds
-from rig_identification.check.stamps.streams import SECOND, Stream, with_stamps
+from rig_identification.check.stamps.streams import SECOND, Stream
 from rig_identification.check.stamps.told import found, owner, quantity, recordings_text
 from rig_identification.raw import RawSession, Stamps
 
@@ -24,13 +24,7 @@ _DIGITS = 9
 
 def find(session: RawSession) -> tuple[Found, ...]:
     """Streams whose fractions of a second lost their leading zeros, with the zeros put back."""
-    by_device = mended_streams(session, _mend)
-    result = []
-    for devices in groups(by_device):
-        some = [one for device in sorted(devices) for one in by_device[device]]
-        session = with_stamps(session, {one.stream.key: one.stamps for one in some})
-        result.append(_told(session, devices, some))
-    return tuple(result)
+    return undone(session, _mend, _told)
 
 
 def _mend(stream: Stream) -> Mended | None:
