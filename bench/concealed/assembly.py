@@ -148,6 +148,22 @@ class Assembly:
             )
         )
 
+    def pulled(
+        self, anchor: Array, place: Array, length: float, law: Callable[[float, float], float]
+    ) -> None:
+        """Pull a point (3,) of the body to one of the room, by the stretch beyond ``length`` and its rate."""
+
+        def force(_mbs: Any, _time: float, _item: int, stretch: float, rate: float, *_: float) -> float:
+            return law(stretch, rate)
+
+        self.mbs.AddObject(
+            ObjectConnectorSpringDamper(
+                markerNumbers=[self.point(self.ground, anchor), self.point(self.body, place)],
+                referenceLength=length,
+                springForceUserFunction=force,
+            )
+        )
+
     def rod(self, top: Array, hinge: Array, rod: Body, rotation: Array, length: float, cell: str) -> None:
         """A heavy straight cable on two ball joints; ``top`` is its frame's origin, it runs along -z."""
         number, _ = self.add_body(rod, top, rotation)

@@ -19,10 +19,13 @@ from bench.concealed.kinematics import predict
 from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
-STEP = 0.0005  # s
 ROW = 0.001  # s
+#: Steps in a row. The trapezoidal rule slows a swing of w by (w h)^2 / 12: below 2e-4 of it while w h < TURN.
+STEPS_A_ROW = (2, 4, 5, 10)
+TURN = 0.05  # rad
 OIL = 5.0  # 1/s, while the body settles
-SETTLE_STEP, SETTLE_TIME = 0.01, 30.0  # s
+SETTLE_TIME = 30.0  # s
+SETTLE_STEPS = (1e-3, 1e-2)  # s, the shortest and the longest; a step turns the fastest swing by 1 rad
 SPELLS = 8  # of settling
 RESTING = 1e-7  # m/s^2 or rad/s^2
 WATCHED = {
@@ -44,7 +47,12 @@ class SecondEngine:
         refused = [e.name for e in self.effects if not e.in_second()]
         if refused:
             raise ValueError(f"the second engine has no {refused[0]}")
-        self.forcing = [law for law in (e.bind(scene) for e in self.effects) if law is not None]
+        loads = [e for e in self.effects if type(e).assemble is Effect.assemble]
+        self.forcing = [law for law in (e.bind(scene) for e in loads) if law is not None]
+        fastest = max((e.fastest(scene) for e in self.effects), default=0.0)
+        rows = next((n for n in STEPS_A_ROW if fastest * ROW / n < TURN), STEPS_A_ROW[-1])
+        self.step = ROW / rows
+        self._settle_step = float(np.clip(1.0 / max(fastest, 1e-9), *SETTLE_STEPS))
         self._start: Array | None = None
 
     def _assemble(self, oil: float) -> Assembly:
@@ -77,13 +85,13 @@ class SecondEngine:
     def _settle(self, hold: float) -> None:
         made = self._assemble(OIL)
         loads = _Loads(self, made, None, hold)
-        self._solve(made, loads, SETTLE_TIME, SETTLE_STEP, settle=True)
+        self._solve(made, loads, SETTLE_TIME, self._settle_step, settle=True)
         self._start = np.array(made.mbs.systemData.GetODE2Coordinates())
 
     def _left(self, hold: float) -> float:
         made = self._assemble(0.0)
         sensors = [made.watch(OUT.Acceleration), made.watch(OUT.AngularAcceleration)]
-        self._solve(made, _Loads(self, made, None, hold), STEP, STEP)
+        self._solve(made, _Loads(self, made, None, hold), self.step, self.step)
         first = [made.mbs.GetSensorStoredData(s)[0, 1:] for s in sensors]
         return float(np.linalg.norm(np.concatenate(first)))
 
@@ -100,7 +108,7 @@ class SecondEngine:
         time.generalizedAlpha.useIndex2Constraints = not settle
         time.generalizedAlpha.useNewmark = not settle
         time.generalizedAlpha.spectralRadius = 0.6  # while settling: what rings dies out
-        time.newton.useModifiedNewton = True
+        time.newton.useModifiedNewton = not settle
         time.newton.relativeTolerance = 1e-9
         settings.solution.file.write = False
         settings.solution.sensors.writePeriod = max(step, ROW)
@@ -116,7 +124,7 @@ class SecondEngine:
         """From the start, let the body move for ``seconds``, by default the plan's duration."""
         wanted = self.plan.duration if seconds is None else seconds
         rows = round((wanted + self.plan.first_sample) / ROW)
-        motor, half = self.plan.motor, 0.5 * STEP * np.arange(round(2 * rows * ROW / STEP) + 1)
+        motor, half = self.plan.motor, 0.5 * self.step * np.arange(round(2 * rows * ROW / self.step) + 1)
         if motor is None:
             shaft, force = np.zeros((len(half), 2)), np.zeros((len(half), 3))
         else:
@@ -125,15 +133,15 @@ class SecondEngine:
         made = self._assemble(0.0)
         sensors = {name: made.watch(output) for name, output in WATCHED.items()}
         drive = force[::2] @ self.scene.devices.exciter_rotation.T
-        self._solve(made, _Loads(self, made, drive, 0.0), rows * ROW, STEP)
-        kept = slice(None, None, round(2 * ROW / STEP))
+        self._solve(made, _Loads(self, made, drive, 0.0), rows * ROW, self.step)
+        kept = slice(None, None, round(2 * ROW / self.step))
         return self._trajectory(made, sensors, force[kept], shaft[kept])
 
     def stand(self) -> Trajectory:
         """Let the body hang at rest for the plan's duration."""
         made = self._assemble(0.0)
         sensors = {name: made.watch(output) for name, output in WATCHED.items()}
-        self._solve(made, _Loads(self, made, None, 0.0), STEP, STEP)
+        self._solve(made, _Loads(self, made, None, 0.0), self.step, self.step)
         count = round((self.plan.duration + self.plan.first_sample) / ROW) + 1
         return self._trajectory(made, sensors, np.zeros((count, 3)), np.zeros((count, 2)))
 
@@ -212,7 +220,7 @@ class _Loads:
         """Set what acts at ``time``, the end of the step to come."""
         ahead, self._last = time - self._last, time
         if self._drive is not None:
-            row = min(round(time / STEP), len(self._drive) - 1)
+            row = min(round(time / self._engine.step), len(self._drive) - 1)
             mbs.SetLoadParameter(self._exciter, "loadVector", list(self._drive[row]))
         if self._engine.forcing or self._made.laws:
             self._put_laws(time, ahead)

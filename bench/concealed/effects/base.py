@@ -81,6 +81,10 @@ class Effect:
     def assemble(self, made: Any, scene: Scene) -> None:
         """Add to the second engine's mechanism, an :class:`~bench.concealed.assembly.Assembly`."""
 
+    def fastest(self, scene: Scene) -> float:
+        """rad/s of the fastest swing that the effect brings, 0 if none: an engine's step follows it."""
+        return 0.0
+
     @classmethod
     def in_second(cls) -> bool:
         """Whether the second engine has this effect as labs have it."""

@@ -72,6 +72,10 @@ class CableElasticity(Effect):
         for cable in zip(g.ceiling, g.hinge, g.length, *self._constants(scene), strict=True):
             made.elastic_cable(*cable)
 
+    def fastest(self, scene: Scene) -> float:
+        """Of the bounce; that of rocking may be twice as fast."""
+        return 2.0 * float(np.sqrt(np.sum(self._constants(scene)[0]) / scene.body.mass))
+
     def tension(self, model: Any, data: Any, scene: Scene) -> Array:
         """See :class:`Effect`."""
         stiffness, damping = self._constants(scene)

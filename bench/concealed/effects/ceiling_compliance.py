@@ -64,6 +64,10 @@ class CeilingCompliance(Effect):
         )
         return plate
 
+    def fastest(self, scene: Scene) -> float:
+        """Of the plate by itself."""
+        return float(np.sqrt(self.stiffness / self.mass))
+
     def assemble(self, made: Any, scene: Scene) -> None:
         """See :class:`Effect`."""
         made.slide_ceiling(

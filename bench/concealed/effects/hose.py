@@ -65,16 +65,21 @@ class Hose(Effect):
         }
         return {"where": where, "parameters": parameters}
 
+    def pull(self, stretch: float, rate: float) -> float:
+        """N, from how far it is stretched in m and how fast in m/s."""
+        return max(self.stiffness * stretch + self.damping * rate, 0.0) if stretch > 0.0 else 0.0
+
+    def assemble(self, made: Any, scene: Scene) -> None:
+        """See :class:`Effect`."""
+        made.pulled(self.anchor, self.position, self.length, self.pull)
+
     def force(self, state: State) -> Array:
         """See :class:`Effect`."""
         place, velocity = state.point(self.position)
         away = self.anchor - place
         reach = float(np.sqrt(away @ away))
         along = away / reach
-        stretch = reach - self.length
-        if stretch <= 0.0:
-            return np.zeros(6)
-        pull = max(self.stiffness * stretch - self.damping * float(along @ velocity), 0.0)
+        pull = self.pull(reach - self.length, -float(along @ velocity))
         return state.wrench_at(self.position, pull * along)
 
     def observe(self, scene: Scene, paths: Sequence[Trajectory]) -> dict[str, Any]:
