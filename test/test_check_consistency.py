@@ -24,6 +24,7 @@ from rig_identification.check.consistency.trajectory import Trajectory
 from rig_identification.cli.commands.demo import demo_spec
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
+from rig_identification.rig import Mount, Rig
 from rig_identification.session import read_raw, write_session
 from rig_identification.simulate import SampleRates, simulate_session
 
@@ -81,8 +82,14 @@ def turned(part: slice, turn: Array) -> Callable[[Array], Array]:
     return change
 
 
+def described(rig: Rig) -> Rig:
+    """The rig with its marker described: at the body's datum, along its axes."""
+    return replace(rig, mocap=Mount(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])))
+
+
 def test_nothing_is_told_of_a_sound_session(clean: RawSession) -> None:
     assert told(clean) == []
+    assert told(replace(clean, rig=described(clean.rig))) == []
     assert identical.find(clean) == ()
 
 
@@ -121,7 +128,7 @@ def test_motion_slopes_are_the_derivatives(small: ReducedSession) -> None:
     run = small.runs[0]
     fit = fit_rest(small.rig, small.at_rest)
     assert fit is not None
-    model = MotionModel(small.rig, run, *fit.poses[0])
+    model = MotionModel(described(small.rig), run, *fit.poses[0])
     about = model.settled(run.values).trajectory
     rng = np.random.default_rng(2)
     step = 1e-5 * rng.standard_normal((3, run.time.size, 6))
@@ -160,6 +167,43 @@ def test_a_motion_is_found_and_its_forces_agree(small: ReducedSession) -> None:
     tracker = TrackerModel(small.rig, *fit.poses[0], motion.trajectory)
     mirrored = run.values["mocap"] * [-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0]
     assert tracker.cost(mirrored) > tracker.cost(run.values["mocap"]) + 20.0
+
+
+def test_a_tracker_whose_marker_is_described_takes_part_in_the_motion(small: ReducedSession) -> None:
+    """Without the IMU it tells the motion; in a room of another heading it tells the same."""
+    run = small.runs[0]
+    fit = fit_rest(small.rig, small.at_rest)
+    assert fit is not None
+    model = MotionModel(described(small.rig), run, *fit.poses[0])
+    wanted = model.settled(run.values).trajectory
+    alone = {"mocap": run.values["mocap"]}
+    turn = Rotation.from_rotvec([0.0, 0.0, 1.0])
+    known = run.values["mocap"]
+    turned = np.concatenate(
+        [turn.apply(known[:, :3]), (turn * Rotation.from_quat(known[:, 3:])).as_quat()], 1
+    )
+    for values in (alone, {"mocap": turned}):
+        found = model.settled(values)
+        assert {"mocap_place", "mocap_turn"} <= found.cost.keys()
+        miss = found.trajectory.turn - wanted.turn
+        assert np.std(miss - miss.mean(axis=0)) < 0.1 * np.std(wanted.turn)
+
+
+def test_forces_take_cells_by_the_gains_that_rest_tells(small: ReducedSession) -> None:
+    """A cell 30 % high disagrees where its gain is believed, and agrees where rest has found it."""
+    run, name = small.runs[0], small.rig.cables[0].name
+    high = {name: 1.3 * run.values[name]}
+    at_rest = tuple(r.with_values({name: 1.3 * r.values[name]}) for r in small.at_rest)
+    sound = fit_rest(small.rig, small.at_rest)
+    found = fit_rest(small.rig, at_rest, Loosened(gains=(name,)))
+    assert sound is not None
+    assert found is not None
+    motion = MotionModel(small.rig, run, *sound.poses[0]).settled(run.values).trajectory
+    as_it_was = ForceModel(small.rig, motion, sound).cost(run.values)[0]
+    believed = ForceModel(small.rig, motion, sound).cost({**run.values, **high})[0]
+    told = ForceModel(small.rig, motion, sound, found).cost({**run.values, **high})[0]
+    assert told == pytest.approx(as_it_was, abs=3.0)
+    assert believed > told + 3.0
 
 
 def test_the_likelihood_is_that_of_what_was_recorded() -> None:
@@ -221,6 +265,15 @@ def gravity_gone(raw: RawSession) -> RawSession:
     return changed(raw, "imu", change)
 
 
+def counted(raw: RawSession) -> RawSession:
+    """Counts that chance to lie near newtons, each cell with a scale and a zero of its own."""
+    weight = 9.81 * (raw.rig.mass or 0.0)
+    for k, cable in enumerate(raw.rig.cables):
+        scale, zero = 0.8 + 0.15 * k, 0.1 * weight * (-1.0) ** k
+        raw = changed(raw, cable.name, lambda v, scale=scale, zero=zero: np.round(scale * v + zero))  # type: ignore[misc]
+    return raw
+
+
 FAULTS: dict[str, tuple[Callable[[RawSession], RawSession], str, object]] = {
     "cell in lbf": (lambda raw: changed(raw, "cable_2", lambda v: v / 4.4482216), "unit", "cable_2"),
     "gyroscope in degrees": (
@@ -241,6 +294,25 @@ FAULTS: dict[str, tuple[Callable[[RawSession], RawSession], str, object]] = {
         lambda raw: changed(raw, "mocap", lambda v: v[:, [0, 1, 2, 6, 3, 4, 5]]),
         "axes",
         "mocap",
+    ),
+    "IMU in g and degrees": (
+        lambda raw: changed(
+            changed(raw, "imu", columns(180.0 / np.pi, slice(0, 3))),
+            "imu",
+            columns(1.0 / 9.80665, slice(3, 6)),
+        ),
+        "unit",
+        "imu",
+    ),
+    "tracker's positions mirrored": (
+        lambda raw: changed(replace(raw, rig=described(raw.rig)), "mocap", columns(-1.0, slice(1, 2))),
+        "axes",
+        "mocap",
+    ),
+    "cells in counts": (
+        lambda raw: counted(raw),
+        "unit",
+        ["cable_1", "cable_2", "cable_3", "cable_4"],
     ),
     "tracker in mm": (lambda raw: changed(raw, "mocap", columns(1000.0, slice(0, 3))), "unit", "mocap"),
     "cells swapped": (exciter_swapped, "wiring", ["cable_1", "cable_2"]),

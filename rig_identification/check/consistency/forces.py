@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.check.consistency.measured import ACROSS, ORDINARY, TINY
-from rig_identification.check.consistency.motion import nats
+from rig_identification.check.consistency.motion import INDEPENDENT, nats
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import SCALE
 from rig_identification.check.consistency.trajectory import Trajectory, rotation
@@ -100,13 +100,21 @@ class ForceModel:
         slope = slope - slope.mean(axis=0)
         rows = (sharp @ slope).reshape(-1, slope.shape[2])
         miss = (deviation - slope[:, :, :10] @ self.guess) @ sharp.T
-        doubt = np.concatenate([self.guess_std, self.share_std / self.share])
-        normal = rows.T @ rows + np.diag(1.0 / doubt**2)
-        change = np.linalg.solve(normal, rows.T @ miss.reshape(-1))
-        left = miss - (rows @ change).reshape(-1, 6)
-        square = np.mean(left**2, axis=0)
-        belief = 0.5 * float(np.sum(np.log1p((change / doubt) ** 2)))
         sharpness = np.full(6, float(np.exp(np.mean(np.log(std / np.maximum(spread, TINY))))))
+        # Least squares with gains need not be the likeliest: each reading chooses its level of ordinary error
+        tried = [self._fitted(rows[:, :count], miss, sharpness) for count in (10, rows.shape[1])]
+        return min(tried, key=lambda one: one[0])
+
+    def _fitted(self, rows: Array, miss: Array, sharpness: Array) -> tuple[float, Array]:
+        """Nats and what is left once the ten numbers, and gains where ``rows`` has them, are fitted."""
+        gain_std = (self.share_std / self.share)[: rows.shape[1] - 10]
+        # Samples are far more than independent observations: rest's word on the gains weighs as much more
+        sure = 1.0 / gain_std**2 * max(1.0, len(miss) / INDEPENDENT)
+        normal = rows.T @ rows + np.diag(np.concatenate([1.0 / self.guess_std**2, sure]))
+        change = np.linalg.solve(normal, rows.T @ miss.reshape(-1))
+        square = np.mean((miss - (rows @ change).reshape(-1, 6)) ** 2, axis=0)
+        belief = 0.5 * float(np.sum(np.log1p((change[:10] / self.guess_std) ** 2)))
+        belief += 0.5 * float(np.sum((change[10:] / gain_std) ** 2))
         return float(np.sum(nats(square, sharpness))) + belief, np.sqrt(square)
 
 

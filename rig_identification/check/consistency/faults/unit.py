@@ -24,10 +24,6 @@ ACCELERATIONS = {"g": GRAVITY, "milli-g": GRAVITY / 1000.0}
 RATES = {"degrees per second": np.pi / 180.0, "rpm": np.pi / 30.0}
 ANGLES = {"degrees": np.pi / 180.0, "milliradians": 0.001}
 LENGTHS = {"mm": 0.001, "cm": 0.01, "inches": INCH, "feet": 12.0 * INCH}
-
-
-#: A cell whose scale is off by more than this factor has no calibration at all.
-FAR = 2.0
 #: A rig's cables differ in length by less than this factor: a length in another unit stands out by more.
 APART = 10.0
 
@@ -40,7 +36,6 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
         for cell in cells:
             yield _device((cell,), slice(None), "tension", "N", unit, factor, frozenset(cells))
         yield _device(("exciter",), slice(None), "force", "N", unit, factor, frozenset(["exciter"]))
-    yield from _counts(evidence, cells)
     yield from _imu()
     for unit, factor in ANGLES.items():
         yield _device(
@@ -66,7 +61,7 @@ def _device(
     factor: float,
     about: frozenset[str],
 ) -> Hypothesis:
-    change = Change({device: _scaled(columns, factor) for device in devices})
+    change = Change({device: scaled(columns, factor) for device in devices})
     name = "the load cells" if len(devices) > 1 else _named(devices[0])
     channel: object = devices[0] if len(devices) == 1 else list(devices)
 
@@ -112,43 +107,9 @@ def _both_halves(force: str, factor: float, rate: str, share: float) -> Hypothes
     )  # fmt: skip
 
 
-def _counts(evidence: Evidence, cells: list[str]) -> Iterator[Hypothesis]:
-    """Readings in no unit of force, in proportion to it: a converter's counts or millivolts."""
-    rest = evidence.without(frozenset(cells)).rest
-    if rest is None:
-        return
-    readings = {c: v for c in cells if (v := evidence.session.at_rest[0].values.get(c)) is not None}
-    wanted = {c: float(rest.expected[0][c][0]) for c in readings}
-    for chosen in [tuple(readings), *((c,) for c in readings)]:
-        have = sum(float(readings[c][0, 0]) for c in chosen)
-        factor = sum(wanted[c] for c in chosen) / have if have else 0.0
-        if factor > 0.0 and abs(np.log(factor)) > np.log(FAR):
-            yield _proportional(chosen, factor, frozenset(cells))
+def scaled(columns: slice, factor: float) -> Reading:
+    """Readings whose columns are multiplied by a factor."""
 
-
-def _proportional(chosen: tuple[str, ...], factor: float, about: frozenset[str]) -> Hypothesis:
-    def describe(rest: RestFit | None) -> SetupFault:
-        who = "The load cells read" if len(chosen) > 1 else f"The cell of {chosen[0]} reads"
-        return fault(
-            "unit",
-            {
-                "channel": list(chosen) if len(chosen) > 1 else chosen[0],
-                "quantity": "tension",
-                "unit": "counts",
-            },
-            {"factor": (factor, 0.01 * factor, "N per count")},
-            f"{who} in no unit of force, perhaps raw counts: one of them is about {factor:.4g} N.",
-            "Calibrate in the driver: publish N. Until then it is left out: nothing tells a cell's scale and "
-            "zero well enough.",
-            corrected=False,
-        )
-
-    change = Change({c: _scaled(slice(None), factor) for c in chosen})
-    out = Change(left_out=chosen)
-    return Hypothesis(change, describe, about, variants=len(about) + 1, free=1, fitted=lambda rest: out)
-
-
-def _scaled(columns: slice, factor: float) -> Reading:
     def right(values: Array, _: str) -> Array:
         out: Array = np.array(values)
         out[:, columns] *= factor
