@@ -20,9 +20,9 @@ from bench.concealed.scene import Array, Plan, Scene
 from bench.concealed.signals import Trajectory
 
 ROW = 0.001  # s
-#: Steps in a row. The trapezoidal rule slows a swing of w by (w h)^2 / 12: below 2e-4 of it while w h < TURN.
+#: Steps in a row. The trapezoidal rule slows a swing of w by (w h)^2 / 12: below 5e-5 of it while w h < TURN.
 STEPS_A_ROW = (2, 4, 5, 10)
-TURN = 0.05  # rad
+TURN = 0.025  # rad
 OIL = 5.0  # 1/s, while the body settles
 SETTLE_TIME = 30.0  # s
 SETTLE_STEPS = (1e-3, 1e-2)  # s, the shortest and the longest; a step turns the fastest swing by 1 rad
