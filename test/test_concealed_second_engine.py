@@ -84,20 +84,19 @@ def _moved(engine: type[Any], scene: Scene, effects: list[Effect]) -> Trajectory
     ],
 )
 def test_both_engines_move_alike(rig: str, name: str) -> None:
-    """Apart by a fraction of one sample's noise at most.
-
-    The largest is MuJoCo's: of five cables it has the tensions to 0.3 N. Shorter steps here change nothing.
-    """
+    """Apart by a tenth of one sample's noise at most."""
     scene = _scene(rig)
     effects = _effects(scene, name)
     one, other = (_moved(engine, scene, effects) for engine in (Engine, SecondEngine))
-    after, noise = slice(SETTLED, None), scene.rig.noise
-    assert np.abs(other.tension - one.tension)[after].max() < 0.15 * noise["tension"]
+    # Of the last two rows MuJoCo reports what acted at the start of a step
+    after, noise = slice(SETTLED, -2), scene.rig.noise
+    assert np.abs(other.tension - one.tension)[after].max() < 0.1 * noise["tension"]
     assert np.abs(other.rate - one.rate)[after].max() < 0.1 * noise["angular_rate"]
     assert np.abs(other.acceleration - one.acceleration)[after].max() < 0.1 * noise["specific_force"]
     assert np.ptp(one.position, axis=0).max() > 0.003
-    np.testing.assert_array_equal(other.shaft, one.shaft)
-    np.testing.assert_allclose(other.force, one.force, atol=1e-9)
+    # The shaft's angle is summed up at other steps
+    np.testing.assert_allclose(other.shaft, one.shaft, atol=1e-5)
+    np.testing.assert_allclose(other.force, one.force, atol=0.01 * noise["exciter_force"])
 
 
 @pytest.mark.parametrize("rig", ["case_12", "bifilar"])
