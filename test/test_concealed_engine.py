@@ -142,8 +142,8 @@ def test_cables_that_let_go_report_what_acted() -> None:
     assert 0.02 < np.mean(loose) < 0.9
     near = np.convolve(loose, np.ones(101), mode="same") > 0.0
     assert np.mean(near) < 0.95
-    # At the first and the last row differences are one-sided
-    assert np.abs(_unbalanced(violent, path)[1:-1][~near[1:-1]]).max() < 1e-4
+    # The last two rows are what MuJoCo reports, for want of a row beyond; the first 10 ms are the release
+    assert np.abs(_unbalanced(violent, path)[10:-2][~near[10:-2]]).max() < 1e-4
 
 
 def test_heavy_cables_report_what_acted() -> None:
@@ -164,7 +164,7 @@ def test_heavy_cables_report_what_acted() -> None:
         across -= np.sum(across * along, axis=1, keepdims=True) * along
         left += density * length * across
     # The first milliseconds, in which the joints of rods that were laid out at rest settle, are MuJoCo's
-    settled = left[50:-1]
+    settled = left[50:-2]
     assert np.abs(settled).max() < 1e-5 * scene.body.mass * scene.rig.gravity
 
 
