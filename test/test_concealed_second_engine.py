@@ -133,6 +133,17 @@ def test_newton_holds_with_the_tensions_that_it_reports() -> None:
     assert np.abs(force - taken)[2:].max() < 1e-5 * body.mass * scene.rig.gravity
 
 
+def test_many_stiff_cables_come_to_rest() -> None:
+    stiff = 4e7  # N
+    scene = draw_lab_scene(90002, SECONDS, name="parallel_8", stiffness=stiff)
+    for plan in scene.plans[:2]:
+        engine = SecondEngine(scene, [CableElasticity(stiff, 0.02)], plan)
+        assert engine.release() < 1e-6
+        pulled = engine.stand().tension[0]
+        carried = (scene.body.mass + plan.dummy_mass) * scene.rig.gravity
+        assert pulled.sum() == pytest.approx(carried, rel=1e-4)
+
+
 def test_it_refuses_by_name_what_it_has_not() -> None:
     from bench.concealed.effects.cable_slack import CableSlack
 

@@ -24,9 +24,13 @@ ROW = 0.001  # s
 STEPS_A_ROW = (2, 4, 5, 10)
 TURN = 0.025  # rad
 OIL = 5.0  # 1/s, while the body settles
-SETTLE_TIME = 30.0  # s
-SETTLE_STEPS = (1e-3, 1e-2)  # s, the shortest and the longest; a step turns the fastest swing by 1 rad
-SPELLS = 8  # of settling
+SETTLE_TIME = 10.0  # s
+SETTLE_STEPS = (
+    4e-3,
+    1e-2,
+)  # s, the shortest and the longest; between, a step turns the fastest swing by 1 rad
+SPELLS = 20  # of settling
+TOLERANCE = 1e-10  # of the weight
 RESTING = 1e-7  # m/s^2 or rad/s^2
 WATCHED = {
     "position": OUT.Position,
@@ -110,6 +114,8 @@ class SecondEngine:
         time.generalizedAlpha.spectralRadius = 0.6  # while settling: what rings dies out
         time.newton.useModifiedNewton = not settle
         time.newton.relativeTolerance = 1e-9
+        # Stiff cables: what their length is rounded to is more than Exudyn's own 1e-10 N
+        time.newton.absoluteTolerance = TOLERANCE * self.scene.body.mass * self.scene.rig.gravity
         settings.solution.file.write = False
         settings.solution.sensors.writePeriod = max(step, ROW)
         loads.put_first()
