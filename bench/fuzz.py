@@ -44,8 +44,8 @@ def answered(recipe: Recipe, seconds: float) -> str:
     seconds: after which the search for left-out physics begins nothing new.
     """
     from rig_identification.identification import prepare, with_examination
-    from rig_identification.mismatch.identify import identify
     from rig_identification.report import write_report, write_result
+    from rig_identification.search.identify import identify
 
     raw = session_of(recipe)
     if not raw.recordings:
@@ -143,8 +143,6 @@ def main() -> None:
     parser.add_argument("--replay", type=int, help="one seed, with what it is made of")
     parser.add_argument("--shrink", action="store_true", help="and its simplest relative that fails alike")
     arguments = parser.parse_args()
-    import rig_identification.mismatch.identify
-    import rig_identification.report  # noqa: F401  forked processes share what is imported once
 
     def recipe(seed: int) -> Recipe:
         drawn = recipe_of(seed)

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.mismatch.identify import identify
 from rig_identification.result import ELEMENTS, Identification
 from rig_identification.rig import DEFAULT_TOLERANCE, Cable, Rig
+from rig_identification.search.identify import identify
 from rig_identification.simulate import Posed, RunSpec, SampleRates, SessionSpec, simulate_session
 
 Array = NDArray[np.float64]

@@ -52,7 +52,7 @@ def identify_prepared(prepared: Prepared, progress: Progress | None = None) -> I
 
     Raises InputError where the session holds nothing to fit.
     """
-    from rig_identification.mismatch import identify  # compiles: not before a session is there
+    from rig_identification.search.identify import identify  # compiles: not before a session is there
 
     return with_examination(identify(prepared.session, progress=progress), prepared.examination)
 

@@ -37,7 +37,7 @@ COMPILED_ONCE = """
 import numpy as np
 from test_simulate_identify import shaken
 
-from rig_identification.mismatch.identify import identify
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 identify(simulate_session(shaken(14), np.random.default_rng(1))[0])

@@ -14,9 +14,9 @@ from test_simulate_identify import shaken
 
 from rig_identification.errors import InputError
 from rig_identification.live.generalized_wrench import generalized_wrench
-from rig_identification.mismatch.identify import identify
 from rig_identification.model.equilibrium import find_rest, own_weights
 from rig_identification.model.motion import rig_model
+from rig_identification.search.identify import identify
 from rig_identification.session.rig_description import read_rig
 from rig_identification.session.rig_document import rig_document
 from rig_identification.simulate import simulate_session

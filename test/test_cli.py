@@ -44,9 +44,9 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
             seen.update(options, path=path)
             return RawSession("van", session.rig, ())
 
-        module = types.ModuleType("rig_identification.mismatch")
+        module = types.ModuleType("rig_identification.search.identify")
         module.identify = identify  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "rig_identification.mismatch", module)
+        monkeypatch.setitem(sys.modules, "rig_identification.search.identify", module)
         monkeypatch.setattr("rig_identification.session.read_raw", read_raw)
         prepared = Prepared(session, Examination("van", (), (), (), ("imu: nobody knows.",)))
         monkeypatch.setattr("rig_identification.identification.prepare", lambda *_: prepared)

@@ -15,10 +15,10 @@ from rig_identification.estimate.identify import fit_session, judged, pose_probl
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import CannotBeFollowed, Point
 from rig_identification.estimate.unanswered import unanswered
-from rig_identification.mismatch import identify
 from rig_identification.model.motion import State
 from rig_identification.recording import Session
 from rig_identification.report.result_json import result_to_dict
+from rig_identification.search.identify import identify
 from rig_identification.simulate import SampleRates, simulate_session
 
 

@@ -10,9 +10,9 @@ from test_estimate_prediction import recorded
 from test_model_rigs import thesis_case_14
 
 from rig_identification.estimate.origins import Origins, moved, near_origins
-from rig_identification.mismatch import identify
 from rig_identification.recording import Session
 from rig_identification.result import Identification
+from rig_identification.search.identify import identify
 
 FAR = Origins(np.array([-20.0, 30.0, -5.0]), np.array([-100.0, 60.0, -8.0]))
 

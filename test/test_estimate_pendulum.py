@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from bench.pendulums import drawn
 from rig_identification.estimate.rolling import depth_of
-from rig_identification.mismatch.identify import identify
 from rig_identification.model.equilibrium import design_pose, settle
 from rig_identification.model.modes import natural_modes
 from rig_identification.model.motion import rig_model
 from rig_identification.recording import Recording, Session
 from rig_identification.result import ELEMENTS, Identification
 from rig_identification.rig import DEFAULT_TOLERANCE, Cable, Rig
+from rig_identification.search.identify import identify
 from rig_identification.session import read_session
 from rig_identification.simulate import Posed, RunSpec, SampleRates, SessionSpec, simulate_session
 

@@ -19,9 +19,9 @@ from rig_identification.estimate.solve import (
     Point,
     Problem,
     _bounded_step,
-    _moved,
     _pulled_back,
     evaluate,
+    moved_by,
 )
 
 #: Std of a doubt's prior that the tests let it lie off.
@@ -106,12 +106,12 @@ def test_a_step_is_pulled_back_into_the_valley(fit: tuple[Problem, Point]) -> No
     assert current is not None
 
     def at(change: np.ndarray) -> Evaluation:
-        there = evaluate(problem, _moved(problem, current, change), residuals_only=True)
+        there = evaluate(problem, moved_by(problem, current, change), residuals_only=True)
         assert there is not None
         return there
 
     straight = _bounded_step(problem, current, 0.0)
-    promised = fitting._promised(current, straight)
+    promised = fitting.promised_by(current, straight)
     back = at(_pulled_back(problem, current, 0.0, straight, at(straight)))
     assert abs(current.cost - back.cost - promised) < 0.1 * abs(current.cost - at(straight).cost - promised)
     # Where nothing is curved nothing is to be taken back

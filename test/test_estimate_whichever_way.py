@@ -15,11 +15,11 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import solve, still_promised
 from rig_identification.estimate.symmetry import turns
 from rig_identification.estimate.whichever_way import lead, only_seen, turned
-from rig_identification.mismatch.identify import identify
 from rig_identification.model.body import point_inertia, six_elements
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.rig import Mount, Rig
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 SEED = 3

@@ -94,7 +94,7 @@ def small(seed: int, latent: bool, poles: int = 0) -> Small:
     )
 
 
-@given(SEEDS, st.sampled_from([(False, 0), (True, 0), (False, 2), (False, 4)]))
+@given(SEEDS, st.sampled_from([(False, 0), (True, 0), (False, 2), (True, 2), (False, 4), (True, 4)]))
 @settings(max_examples=15, deadline=None, derandomize=True)
 def test_whitened_least_squares_are_generalised_least_squares(seed: int, how: tuple[bool, int]) -> None:
     s = small(seed, *how)
@@ -111,7 +111,7 @@ def test_whitened_least_squares_are_generalised_least_squares(seed: int, how: tu
     assert log_spread == pytest.approx(0.5 * np.linalg.slogdet(covariance)[1], rel=1e-9, abs=1e-9)
 
 
-@given(SEEDS, st.sampled_from([(False, 0), (True, 0), (False, 2), (False, 4)]))
+@given(SEEDS, st.sampled_from([(False, 0), (True, 0), (False, 2), (True, 2), (False, 4), (True, 4)]))
 @settings(max_examples=15, deadline=None, derandomize=True)
 def test_smoother_is_the_posterior_mean(seed: int, how: tuple[bool, int]) -> None:
     s = small(seed, *how)

@@ -16,13 +16,13 @@ from rig_identification.mismatch.along_measured import Along, acts, along_measur
 from rig_identification.mismatch.candidate import MANY, Candidate, added
 from rig_identification.mismatch.first_fits import at_noise
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.search import worst_pieces
 from rig_identification.mismatch.standing import short_pieces
 from rig_identification.mismatch.trial import VERY_FAR, attempt
 from rig_identification.mismatch.unbent import at_first
 from rig_identification.recording import Recording, Session
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 #: N m of each hinge.

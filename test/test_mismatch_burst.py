@@ -10,8 +10,8 @@ from test_mismatch_push_beside import moved
 from test_simulate_identify import shaken
 
 from rig_identification.mismatch.burst import standing_out
-from rig_identification.mismatch.identify import identify
 from rig_identification.recording import Session
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 ROTOR, PUSH, START, LASTS = 28.0, 150.0, 9.0, 1.2  # kg; N at the peak along the exciter's z; s

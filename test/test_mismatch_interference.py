@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
-from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.interference import lines_at_rest, without_lines
 from rig_identification.recording import Recording, Series, Session
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 TONE, HUM = 37.013, {"cable_1": 4.0, "cable_2": 9.0, "cable_3": 2.0, "cable_4": 6.0}

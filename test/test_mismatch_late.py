@@ -10,10 +10,10 @@ import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 from test_simulate_identify import shaken
 
-from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.in_motion import cost_in_motion, unearned
 from rig_identification.mismatch.late import told_apart
 from rig_identification.recording import Recording
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 SAMPLES, DURATION = 4000, 40.0

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
-from rig_identification.mismatch.identify import identify
 from rig_identification.recording import Recording
 from rig_identification.result import Identification
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 #: Turn of the inclinometer about y, rad, which all contradicts; kg of entrained air, which nothing does.

@@ -10,9 +10,9 @@ from test_mismatch_push_beside import biased, moved
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import Ideal, fit_session, judged
-from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.pulse import likeliest_pulse
 from rig_identification.recording import Session
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 PUSH, START, LASTS = 25.0, 9.0, 0.8  # N at the peak along the exciter's z; s

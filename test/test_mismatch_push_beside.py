@@ -9,9 +9,9 @@ import pytest
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import fit_session
-from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.push import all_without
 from rig_identification.recording import Recording, Session
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 BIAS = 0.012  # rad/s about x, some hundred samples' noise

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
-from rig_identification.mismatch.identify import identify
 from rig_identification.recording import Recording
 from rig_identification.result import Identification
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 #: Of the reading at 3000 N, about as much at twice that.

@@ -11,11 +11,11 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import evaluate
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.identify import identify
 from rig_identification.mismatch.screen import carried, extended, screen, with_reference
 from rig_identification.mismatch.trial import log_evidence, mass_of
 from rig_identification.mismatch.undecided import shared_by_places
 from rig_identification.result import Identification
+from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 
 #: kg of entrained air that gains less than chance may, and more than its prior is charged.

@@ -43,6 +43,13 @@ def pendulum(mass: float, point: Array, frequency: float, damping: float = 0.0) 
     return blocks
 
 
+def on_springs(mass: float, point: Array, frequencies: tuple[float, float, float]) -> Array:
+    """Blocks of a part with another frequency along each axis."""
+    blocks = rider(mass, point, AXES, frequencies[0])
+    blocks[:, layout.FREQUENCY] = frequencies
+    return blocks
+
+
 def ceiling(compliance: float, axis: Array, frequency: float, damping: float = 0.0) -> Array:
     """Block of a ceiling that yields along ``axis``."""
     block = np.zeros((1, layout.INTERNAL_SIZE))
@@ -93,7 +100,10 @@ def energy(model: RigModel, motion: Motion) -> Array:
                 moved, fixed = v + np.cross(w, a + shift) + slip, v + np.cross(w, a)
                 total[k] += 0.5 * m * (moved @ moved - fixed @ fixed) - m * gravity @ R @ shift
                 if not b[layout.PENDULUM]:
-                    total[k] += m * shift @ (R_rest.T @ gravity) + 0.5 * m * omega**2 * shift @ shift
+                    total[k] += m * shift @ (R_rest.T @ gravity)
+                    for i in mine:
+                        own = 2.0 * np.pi * (blocks[i, layout.FREQUENCY] or b[layout.FREQUENCY])
+                        total[k] += 0.5 * m * own**2 * q[i] ** 2
     return total
 
 
@@ -103,6 +113,7 @@ def rigs() -> list[tuple[str, RigModel, Sample]]:
         ("slosh", thesis_case_14(), rider(80.0, np.array([0.4, 0.2, -0.8]), AXES[:2], 0.8)),
         ("pendulum", thesis_case_14(), pendulum(80.0, np.array([0.4, 0.2, -0.8]), 0.6)),
         ("sprung", trifilar(), rider(40.0, np.array([-0.2, 0.1, -0.6]), AXES[2:], 2.1)),
+        ("all ways", thesis_case_14(), on_springs(300.0, np.array([0.3, -0.4, -0.7]), (3.4, 4.1, 2.2))),
         ("ceiling", thesis_case_14(), ceiling(2e-6, AXES[2], 5.0)),
         ("sideways", trifilar(), ceiling(5e-6, np.array([0.6, 0.8, 0.0]), 4.0)),
     ):
@@ -139,7 +150,8 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
     model = model.with_internal(pendulum(30.0, np.array([0.1, 0.2, -0.4]), 1.4, 0.02))
     model = model.with_internal(rider(0.0, np.array([0.1, -0.3, -0.2]), AXES[2:], 2.0, 0.02))
     model = model.with_internal(ceiling(1e-6, AXES[2], 6.0, 0.03))
-    assert model.internal == 6
+    model = model.with_internal(on_springs(40.0, np.array([-0.2, 0.3, -0.3]), (3.1, 4.2, 2.5)))
+    assert model.internal == 9
     start, drive = moving(sample, model, 5), driven(41, 0.01, 5)
     body = [
         layout.INERTIAL,
@@ -151,6 +163,7 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
     steps = {layout.MASS: 0.1, layout.POINT: 1e-3, layout.POINT + 2: 1e-3}
     steps |= {layout.FREQUENCY: 1e-4, layout.DAMPING_RATIO: 1e-3}
     entries = {place.internal_block(3, k) + e: h for k in (0, 2, 4) for e, h in steps.items()}
+    entries[place.internal_block(3, 7) + layout.FREQUENCY] = 1e-4
     entries[place.internal_block(3, 5) + layout.COMPLIANCE] = 1e-10
     entries[place.internal_block(3, 5) + layout.FREQUENCY] = 1e-3
     exact = simulate(model, start, drive, directions=np.array(list(entries)), substeps=20)

@@ -61,6 +61,27 @@ def test_a_hose_that_goes_slack_and_taut_keeps_energy() -> None:
     assert np.ptp(kinetic + potential + stored) < 1e-5 * np.ptp(kinetic)
 
 
+def test_what_damps_a_hose_takes_energy_while_it_is_taut() -> None:
+    """Its power is damping times the square of the rate of its length."""
+    sample, damping, step = thesis_case_14(), 300.0, 0.0025
+    reach, pull = np.array([0.9, -1.2, 0.2]), np.array([3000.0, -4000.0, 0.0])
+    plain = sample.model(rods=True)
+    model = tied(sample, plain, STIFFNESS, pull, reach)
+    physics = model.physics.copy()
+    physics[place.effects_block(model.cables) + place.TETHER_DAMPING] = damping
+    model = model.with_physics(physics)
+    motion = simulate(model, moving(sample, plain, 2), Input.none(2001, step), substeps=4)
+    kinetic, potential = kinetic_and_potential(model, motion)
+    stretch = stretch_of(sample, motion, pull, reach)
+    rate = np.gradient(stretch, step)
+    assert np.all(STIFFNESS * stretch + damping * rate > 0.0)
+    energy = kinetic + potential + 0.5 * STIFFNESS * stretch**2
+    power = damping * rate**2
+    taken = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * step])
+    assert taken[-1] > 0.05 * np.ptp(kinetic)
+    np.testing.assert_allclose(energy[0] - energy, taken, atol=2e-3 * taken[-1])
+
+
 def test_a_hose_to_a_wall_far_away_is_a_spring_along_its_line() -> None:
     """What it turns by shrinks as one over its reach."""
     sample = thesis_case_14()
@@ -92,11 +113,15 @@ def test_derivatives_of_a_taut_hose() -> None:
     model = tied(sample, plain, STIFFNESS, pull, reach)
     state, drive = moving(sample, plain, 5), drive_of(31, 0.01, 5)
     block = place.effects_block(model.cables)
+    physics = model.physics.copy()
+    physics[block + place.TETHER_DAMPING], physics[block + place.TETHER_PRELOAD] = 400.0, 900.0
+    model = model.with_physics(physics)
     own = [
         block + first + i
         for first in (place.TETHER_STIFFNESS, place.TETHER_PULL, place.TETHER_POINT, place.TETHER_REACH)
         for i in range(3)
     ]
+    own += [block + place.TETHER_DAMPING, block + place.TETHER_PRELOAD]
     exact = simulate(model, state, drive, directions=np.array(own), substeps=SUBSTEPS)
     assert exact.J is not None
     for k, entry in enumerate(own):

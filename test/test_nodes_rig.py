@@ -26,8 +26,8 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64MultiArray, String
 from visualization_msgs.msg import MarkerArray
 
-from rig_identification.mismatch import identify
 from rig_identification.nodes.rig_node import LATCHED
+from rig_identification.search.identify import identify
 from rig_identification.session import read_session
 
 DUMMY = [0.16, 0.2, -0.2]

@@ -20,13 +20,14 @@ PACKAGE = ROOT / "rig_identification"
 NAME = "rig_identification"
 
 VALUES = {"", "errors", "examination", "raw", "rig", "recording", "result", "topics"}
-CORE = {"model", "estimate", "mismatch", "statics", "live"}
+CORE = {"model", "estimate", "mismatch", "search", "statics", "live"}
 # What a room may import of the package besides itself and the shared values; the front door may import all.
 ALLOWED = {
     "model": set(),
     "statics": {"model"},
     "estimate": {"model", "statics"},
     "mismatch": {"model", "statics", "estimate"},
+    "search": {"model", "statics", "estimate", "mismatch"},
     "cleaning": set(),
     "check": {"model", "statics", "cleaning"},
     "thesis": CORE,
@@ -36,7 +37,7 @@ ALLOWED = {
     "session": {"cleaning"},
     "report": CORE,
     "live": {"model", "statics", "estimate"},
-    "identification": {"check", "cleaning", "mismatch", "session"},
+    "identification": {"check", "cleaning", "search", "session"},
     "nodes": CORE | {"cleaning", "session", "report", "identification"},
 }
 OUTSIDE_THE_CORE = {

@@ -66,7 +66,7 @@ def test_a_body_less_its_rotor_moves_as_the_body_that_held_it(session):
 
 def test_what_the_thesis_left_out_is_found_and_the_inertia_comes_back(monkeypatch):
     # What is found, and not how soon: beside another test slow cores take longer than a search may
-    module = importlib.import_module("rig_identification.mismatch.identify")
+    module = importlib.import_module("rig_identification.search.identify")
     monkeypatch.setattr(module, "Budget", lambda seconds: Budget(600.0))
     found = examine(load_case(14), 1)
     assert found.verdict == "explained"

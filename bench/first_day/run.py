@@ -25,9 +25,9 @@ from bench.first_day.sessions import kept
 from rig_identification.check.examine import Examined, examine
 from rig_identification.errors import InputError
 from rig_identification.examination import Examination
-from rig_identification.mismatch.identify import identify
 from rig_identification.raw import RawSession
 from rig_identification.result import ELEMENTS
+from rig_identification.search.identify import identify
 from rig_identification.session import clean, read_raw
 
 LIMIT = 60  # s, for an examination

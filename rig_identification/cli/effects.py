@@ -20,7 +20,7 @@ _OF_DEVICE = {
 }
 #: Switches that belong to an effect of another name; ropes that twist have none in the contract's table.
 _OF_SWITCH = {"cable_damping_ratio": "cable_elasticity", "cable_torsion": "unknown"} | dict.fromkeys(
-    ("tether_point", "tether_pull", "tether_reach"), "tether"
+    ("tether_damping", "tether_point", "tether_pull", "tether_reach"), "tether"
 )
 
 

@@ -1,4 +1,4 @@
-"""What noise drives the model with: the error of the exciter's force, and random wrenches.
+"""What noise drives the model with: the error of the exciter's force, and wrenches that the model lacks.
 
 A force that is a line from node to node (sampling.py) errs anew in every interval: six numbers w_k, the
 wrench held over it. One that is smooth (smooth_force.py) errs by what is smooth as well, white up to some
@@ -23,6 +23,24 @@ Array = NDArray[np.float64]
 
 #: No row: noise of a node that has no part in the next one's.
 WHITE = np.zeros((0, 0))
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """A wrench on the body that the model lacks, as noise: force and moment about the datum, body axes.
+
+    Each component is a first-order Markov process of its own (Ornstein-Uhlenbeck): of a constant standard
+    deviation, forgotten with the time constant ``correlation``. A body at rest feels one draw of it.
+    """
+
+    force: float  # std, N
+    moment: float  # std, N m
+    correlation: float  # s
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6) at any instant."""
+        return np.diag([self.force**2] * 3 + [self.moment**2] * 3)
 
 
 @dataclass(frozen=True)
@@ -56,14 +74,18 @@ def random_wrench(
     D: Array,
     felt: Array | None,
     extra: Array | None = None,
+    discrepancy: Discrepancy | None = None,
 ) -> RandomWrench:
     """What the error of a run's force does.
 
     B (N, X, 6), D (m, 6): response of the next state, and of each row, to the wrench of an interval. felt
     (m,): std of the noise that a row feels at once, in that of an interval's; None where a wrench that really
     acts is among it, which reaches every row as it is. extra (6, 6): covariance of such a one over each
-    interval.
+    interval. discrepancy: such a one that goes on.
     """
+    if discrepancy is not None:
+        white = _of_intervals(run, parameters, theta)
+        return _going_on(discrepancy, white if extra is None else white + extra, run.grid.step, B, D)
     if felt is None or run.force is None or run.force.cutoff == 0.0:
         Q = _of_intervals(run, parameters, theta)
         at_once = D if felt is None else felt[:, None] * D
@@ -80,6 +102,22 @@ def random_wrench(
         np.ascontiguousarray(B @ np.kron(midway, spread)),
         np.ascontiguousarray(D @ np.kron(reads, spread)),
         np.asarray(np.kron(reads, spread)),
+    )
+
+
+def _going_on(discrepancy: Discrepancy, white: Array, step: float, B: Array, D: Array) -> RandomWrench:
+    """A discrepancy, and a wrench of covariance ``white`` (N, 6, 6) that is another one in each interval."""
+    kept = float(np.exp(-step / discrepancy.correlation))
+    Q = np.zeros((white.shape[0], 12, 12))
+    Q[:, :6, :6] = (1.0 - kept**2) * discrepancy.covariance
+    Q[0, :6, :6] = discrepancy.covariance
+    Q[:, 6:, 6:] = white
+    return RandomWrench(
+        Q,
+        np.diag([kept, kept, 0.0, 0.0]),
+        np.ascontiguousarray(np.concatenate([B, B], axis=2)),
+        np.ascontiguousarray(np.concatenate([D, D], axis=1)),
+        np.concatenate([np.eye(6), np.zeros((6, 6))], axis=1),
     )
 
 

@@ -11,7 +11,7 @@ from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Channel, Run
-from rig_identification.estimate.force_noise import RandomWrench, random_wrench
+from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, random_wrench
 from rig_identification.estimate.lag import lagged, unsettled
 from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.estimate.side_by_side import spare
@@ -129,7 +129,7 @@ class Linearised:
     row_H: Array  # (m, 12 + 2 s) response of each row to the state at its node
     row_D: Array  # (m, 6) ... and to the wrench
     noise: RandomWrench  # what noise drives the model with
-    latent: Array  # (N, 6) wrench noise that the nominal motion holds
+    latent: Array  # (N, 6) wrench noise that the nominal motion holds, of a discrepancy where there is one
     readings: dict[str, sensors.Reading]  # each device at the nodes
 
     @property
@@ -237,6 +237,7 @@ def linearise_run(
     start_only: bool = False,
     extra_noise: Array | None = None,
     latent: Array | None = None,
+    discrepancy: Discrepancy | None = None,
 ) -> Linearised | None:
     """Whitened residual and Jacobian of one run; None where the motion leaves every bound.
 
@@ -244,7 +245,8 @@ def linearise_run(
     :func:`start_basis`. ``start_only`` leaves the parameters' columns at zero and saves their cost.
     ``extra_noise`` (6, 6): covariance of a further random wrench held over each node interval.
     latent (N, 6): wrench noise that the nominal motion is to hold (:func:`smoothed`); the motion
-    is then linearised about what really happened instead of about an undisturbed one.
+    is then linearised about what really happened instead of about an undisturbed one. discrepancy: a wrench
+    that the model lacks; the latent is then of this one.
     """
     parameters = bench.parameters
     model = model_at(parameters, theta)
@@ -303,9 +305,9 @@ def linearise_run(
         columns[here] = rows.reshape(spread.size, -1)
     plain = columns[:, 0].copy()
     A, B, _, _, _ = motion.derivatives
-    acts = extra_noise is not None or latent is not None
+    acts = extra_noise is not None or latent is not None or discrepancy is not None
     felt = None if acts or not run.channels else np.array([c.felt for c in run.channels])[which]
-    noise = random_wrench(run, parameters, theta, B, D, felt, extra_noise)
+    noise = random_wrench(run, parameters, theta, B, D, felt, extra_noise, discrepancy)
     if np.any(noise.Q):
         log_spread = float(
             whiten(A, noise.through, noise.Q, held, at, H, noise.felt, variance, columns, noise.follow)

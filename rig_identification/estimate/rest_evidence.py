@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.force_noise import Discrepancy
 from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.prediction import Bench, read_device
 from rig_identification.model import layout
 from rig_identification.model.body import point_inertia, six_elements
-from rig_identification.model.equilibrium import Rest, find_rest
+from rig_identification.model.equilibrium import Rest, find_rest, wrench_response
 from rig_identification.model.motion import RigModel, State
 from rig_identification.recording import Dummy, Recording, Series
 from rig_identification.rig import Rig
@@ -124,8 +125,17 @@ class RestLinearised:
         return 0.5 * float(self.residual @ self.residual) + self.log_spread
 
 
-def linearise_rest(bench: Bench, evidence: RestEvidence, theta: Array, guess: State) -> RestLinearised | None:
-    """Residual and Jacobian of one static recording; None where no rest pose is found near ``guess``."""
+def linearise_rest(
+    bench: Bench,
+    evidence: RestEvidence,
+    theta: Array,
+    guess: State,
+    discrepancy: Discrepancy | None = None,
+) -> RestLinearised | None:
+    """Residual and Jacobian of one static recording; None where no rest pose is found near ``guess``.
+
+    discrepancy: a wrench that the model lacks, of which the body feels one draw at rest.
+    """
     parameters = bench.parameters
     model = with_dummy(parameters.model.with_physics(parameters.physics(theta)), evidence.dummy)
     rest = find_rest(model, guess, directions=parameters.directions())
@@ -135,7 +145,8 @@ def linearise_rest(bench: Bench, evidence: RestEvidence, theta: Array, guess: St
     in_physics = parameters.physics_jacobian(theta)
     device_columns, entries, scale = parameters.device_columns()
     R = rest.state.R_world_body[None]
-    residuals, jacobians, predictions = [], [], []
+    residuals, jacobians, predictions, in_wrenches = [], [], [], []
+    in_wrench = np.zeros((0, 6)) if discrepancy is None else wrench_response(model, rest)
     log_spread = 0.0
     for channel in evidence.channels:
         reading = read_device(bench, channel.device, rest.outputs, R, own, channel.time)
@@ -146,12 +157,19 @@ def linearise_rest(bench: Bench, evidence: RestEvidence, theta: Array, guess: St
             if first <= entry < first + reading.in_device.shape[2]:
                 jacobian[:, column] += s * reading.in_device[0, channel.columns, entry - first]
         deviation = np.sqrt(channel.variance)
+        if discrepancy is not None:
+            in_wrenches.append(reading.in_raw[0, channel.columns] @ in_wrench / deviation[:, None])
         residuals.append((channel.mean - predicted) / deviation)
         jacobians.append(jacobian / deviation[:, None])
         predictions.append(predicted)
         log_spread += float(np.sum(np.log(deviation)))
     if not residuals:
         return None
-    return RestLinearised(
-        np.concatenate(residuals), np.concatenate(jacobians), log_spread, rest, tuple(predictions)
-    )
+    residual, jacobian = np.concatenate(residuals), np.concatenate(jacobians)
+    if discrepancy is not None:
+        felt = np.concatenate(in_wrenches)
+        factor = np.linalg.cholesky(np.eye(residual.size) + felt @ discrepancy.covariance @ felt.T)
+        residual = np.asarray(np.linalg.solve(factor, residual), dtype=np.float64)
+        jacobian = np.asarray(np.linalg.solve(factor, jacobian), dtype=np.float64)
+        log_spread += float(np.sum(np.log(np.diag(factor))))
+    return RestLinearised(residual, jacobian, log_spread, rest, tuple(predictions))

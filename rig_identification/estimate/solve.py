@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.box import in_box
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.force_noise import Discrepancy
 from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.prediction import (
     START_UNIT,
@@ -60,6 +61,7 @@ class Problem:
     bound: float = np.inf  # free parameters stay within so many of their prior std
     stride: float = LONGEST_STEP  # longest step of the body, in std of the weak prior
     extra_noise: Array | None = None  # (6, 6) random wrench over a node interval: what the model lacks
+    discrepancy: Discrepancy | None = None  # ... as a wrench that goes on, at rest as well
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,7 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
             start_only=residuals_only,
             extra_noise=problem.extra_noise,
             latent=latent,
+            discrepancy=problem.discrepancy,
         )
 
     runs = side_by_side(one, zip(problem.runs, point.starts, latents, strict=True))
@@ -150,10 +153,11 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
         return None
     rests = []
     for evidence, guess in zip(problem.rests, point.rest_guesses, strict=True):
-        rest = linearise_rest(bench, evidence, point.theta, guess)
+        rest = linearise_rest(bench, evidence, point.theta, guess, problem.discrepancy)
         if rest is None:
             model = with_dummy(model_at(bench.parameters, point.theta), evidence.dummy)
-            rest = linearise_rest(bench, evidence, point.theta, settle(model, guess, FALLS))
+            settled = settle(model, guess, FALLS)
+            rest = linearise_rest(bench, evidence, point.theta, settled, problem.discrepancy)
         if rest is None:
             return None
         rests.append(rest)
@@ -195,7 +199,8 @@ def _assemble(
     return Evaluation(point, runs, rests, cost, information, np.diag(prior).copy(), gradient)
 
 
-def _moved(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
+def moved_by(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
+    """Where a step of every unknown leads."""
     p = problem.bench.parameters.size
     theta = problem.bench.parameters.moved(evaluation.point.theta, change[:p])
     old = model_at(problem.bench.parameters, evaluation.point.theta)
@@ -346,7 +351,7 @@ def as_good_as_settled(problem: Problem, current: Evaluation, close: float = CLO
 
 def still_promised(problem: Problem, current: Evaluation) -> float:
     """Gain (nats) that a full step would bring to second order."""
-    return _promised(current, left_to_go(problem, current))
+    return promised_by(current, left_to_go(problem, current))
 
 
 def left_to_go(problem: Problem, current: Evaluation) -> Array:
@@ -354,7 +359,7 @@ def left_to_go(problem: Problem, current: Evaluation) -> Array:
     return _bounded_step(problem, current, 0.0)
 
 
-def _promised(current: Evaluation, change: Array) -> float:
+def promised_by(current: Evaluation, change: Array) -> float:
     """Gain (nats) of a step to second order."""
     return float(change @ current.gradient - 0.5 * change @ current.information @ change)
 
@@ -430,14 +435,14 @@ def solve(
             # About as little damping failed last
             wary = damping <= 1.01 * BRAKED * failed
             change = _bounded_step(problem, current, damping)
-            gain = _promised(current, change)
+            gain = promised_by(current, change)
             # Along a flat valley the least damping takes all promise away: an undamped step tells the end
             if gain < tolerance and damping <= 1e-3 and still_promised(problem, current) < tolerance:
                 return current, not on_plateau(current)
             if damping > 1e-3 and gain < polish * excess(current):
                 # Held back so much, no step can win what would be worth it
                 return current, as_good_as_settled(problem, current)
-            moved, allowed = _moved(problem, current, change), current.cost + ROUNDING * abs(current.cost)
+            moved, allowed = moved_by(problem, current, change), current.cost + ROUNDING * abs(current.cost)
             if damping <= 1e-3 and gain < AT_ROOT and against < LEAPS:
                 allowed += gain
             trial = evaluate(problem, moved, residuals_only=True) if wary else None
@@ -447,7 +452,7 @@ def solve(
                 spent += 1.0
             if trial is not None and trial.cost >= allowed:
                 change = _pulled_back(problem, current, damping, change, trial)
-                moved = _moved(problem, current, change)
+                moved = moved_by(problem, current, change)
                 trial = evaluate(problem, moved, residuals_only=True)
                 spent += QUICK
                 if trial is not None and current.cost - trial.cost > KEPT * gain:

@@ -76,6 +76,15 @@ def _expected(X, states, latent, follow, k):  # type: ignore[no-untyped-def]
     if follow.shape[0] == 0:
         for i in range(states, X.shape[0]):
             X[i, 0] -= latent[k, i - states]
+        return
+    # What the nominal motion holds is expected to go on as the noise does: it was drawn where it departs
+    held = latent.shape[1]
+    for i in range(held):
+        X[states + i, 0] -= latent[k, i]
+    if k > 0:
+        for i in range(X.shape[0] - states):
+            for j in range(i % ONE, held, ONE):
+                X[states + i, 0] += follow[i // ONE, j // ONE] * latent[k - 1, j]
 
 
 @njit(cache=True, nogil=True)
@@ -102,9 +111,10 @@ def whiten(A, B, Q, latent, node, H, D, variance, columns, follow):  # type: ign
     node (m,): ascending node index of each row. H (m, X), D (m, w): response of the row to
     state (X = 12 and twice the internal coordinates) and noise. variance (m,): sensor noise of
     the row. Q (N or fewer, w, w): covariance of what is drawn at each node. latent (N, w): what the nominal
-    motion already holds of this noise, whose mean is zero all the same; not read where that is not
-    white. follow (f, f): how each component's noise goes on, of no rows where all of it is white. Column 0 is
-    measured less predicted, the others derivatives of the prediction.
+    motion already holds of this noise, whose mean is zero all the same; where it is not white, (N, l) of its
+    first l components. follow (f, f): how each component's noise goes on, of
+    no rows where all of it is white. Column 0 is measured less predicted, the others derivatives of the
+    prediction.
     """
     rows, count = columns.shape
     states = A.shape[1]

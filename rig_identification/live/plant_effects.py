@@ -32,16 +32,22 @@ class Rider:
     damping_ratio: float
     stop: float = 0.0  # m each way to its stops; 0: none
     stop_damping: float = 0.0  # damping ratio of its stops
+    along: Array = field(default_factory=lambda: np.zeros(3))  # Hz along body axes; 0: ``frequency`` alone
 
     def blocks(self, R_rest: Array) -> Array:
         """(k, INTERNAL_SIZE) numbers of its coordinates (model/layout.py). R_rest: body in world at rest."""
         hangs = self.directions.shape[0] == 0
-        axes = R_rest[:2] if hangs else self.directions  # the two horizontal ones, in body axes
+        every = bool(np.any(self.along))
+        axes = (
+            R_rest[:2] if hangs else np.eye(3) if every else self.directions
+        )  # horizontal ones, of a liquid
         out = np.zeros((axes.shape[0], layout.INTERNAL_SIZE))
         out[:, layout.AXIS : layout.AXIS + 3] = axes
         out[0, layout.MASS] = self.mass
         out[0, layout.POINT : layout.POINT + 3] = self.position
         out[0, layout.FREQUENCY], out[0, layout.DAMPING_RATIO] = self.frequency, self.damping_ratio
+        if every:
+            out[:, layout.FREQUENCY] = np.where(self.along > 0.0, self.along, self.frequency)
         out[0, layout.STOP], out[0, layout.STOP_DAMPING] = self.stop, self.stop_damping
         out[0, layout.PENDULUM] = float(hangs)
         return out
@@ -90,6 +96,7 @@ class PlantEffects:
     tether_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
     tether_pull: Array = field(default_factory=lambda: np.zeros(3))  # N, world axes
     tether_reach: Array = field(default_factory=lambda: np.zeros(3))  # m, world; 0: a spring on each axis
+    tether_damping: float = 0.0  # N s/m, along its reach
     law_spring: Array = field(default_factory=lambda: np.zeros(3))  # N/m, N/m^2, N/m^3
     law_brake: Array = field(default_factory=lambda: np.zeros(2))  # N s/m, N s^2/m^2
     law_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
@@ -136,6 +143,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.TETHER_POINT : block + place.TETHER_POINT + 3] = effects.tether_point
     physics[block + place.TETHER_PULL : block + place.TETHER_PULL + 3] = effects.tether_pull
     physics[block + place.TETHER_REACH : block + place.TETHER_REACH + 3] = effects.tether_reach
+    physics[block + place.TETHER_DAMPING] = effects.tether_damping
     physics[block + place.LAW_SPRING : block + place.LAW_SPRING + 3] = effects.law_spring
     physics[block + place.LAW_BRAKE : block + place.LAW_BRAKE + 2] = effects.law_brake
     physics[block + place.LAW_POINT : block + place.LAW_POINT + 3] = effects.law_point

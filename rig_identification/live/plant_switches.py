@@ -88,6 +88,7 @@ SWITCHES = (
     Switch("tether_point", _NOWHERE, "m, body frame", *_PLACE),
     Switch("tether_pull", _NOWHERE, "N along world axes where the rig hangs without it", -1e6, 1e6, "N", 3),
     Switch("tether_reach", _NOWHERE, "m, world: from there to a wall; 0: on each axis a spring", *_PLACE),
+    Switch("tether_damping", 0.0, "N s/m of a hose along its reach", 0.0, 1e6, "N s/m"),
     Switch("point_law.spring", _NOWHERE, "N/m, N/m^2, N/m^3 against a point's travel", -1e12, 1e12, "N/m", 3),
     Switch("point_law.brake", (0.0, 0.0), "N s/m, N s^2/m^2 against its velocity", 0.0, 1e9, "N s/m", 2),
     Switch("point_law.position", _NOWHERE, "m, body frame: the point", *_PLACE),
@@ -99,6 +100,7 @@ SWITCHES = (
     Switch("liquid_slosh.position", _NOWHERE, "m, body frame: where the swinging liquid rests", *_PLACE),
     Switch("sprung_mass.mass", 0.0, "kg of the body that stand on springs", 0.0, 1e5, "kg"),
     Switch("sprung_mass.frequency", 2.0, "Hz of the part against a body held still", 0.1, 20.0, "Hz"),
+    Switch("sprung_mass.along", _NOWHERE, "Hz along body axes; 0: along its line alone", 0.0, 20.0, "Hz", 3),
     Switch("sprung_mass.damping_ratio", 0.03, "of the part on its springs", 0.0, 2.0),
     Switch("sprung_mass.position", _NOWHERE, "m, body frame: where the part rests", *_PLACE),
     Switch("sprung_mass.direction", _X, "body axes: line along which the part moves", -1e3, 1e3, "", 3),
@@ -172,6 +174,7 @@ def effects_of(
         tether_point=values["tether_point"],
         tether_pull=values["tether_pull"],
         tether_reach=values["tether_reach"],
+        tether_damping=number("tether_damping"),
         law_spring=values["point_law.spring"],
         law_brake=values["point_law.brake"],
         law_point=values["point_law.position"],
@@ -223,5 +226,6 @@ def _riders(values: Mapping[str, Array], model: RigModel, prefix: str) -> tuple[
         if effect == "loose_mass":
             stops = float(values["loose_mass.travel"][0]), float(values["loose_mass.stop_damping"][0])
         frequency, damping = values[f"{effect}.frequency"][0], values[f"{effect}.damping_ratio"][0]
-        riders.append(Rider(mass, position, axes, float(frequency), float(damping), *stops))
+        along = values["sprung_mass.along"] if effect == "sprung_mass" else np.zeros(3)
+        riders.append(Rider(mass, position, axes, float(frequency), float(damping), *stops, along))
     return tuple(riders)

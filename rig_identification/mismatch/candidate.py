@@ -39,6 +39,10 @@ class Candidate:
     #: From a fit with it: closer descriptions of the same effect that first order cannot tell from it, and
     #: where their fits start
     closer: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
+    #: ... and such descriptions that only a fit with a discrepancy of its own is asked for (search/)
+    between: Callable[[Problem, Evaluation], list[tuple[Candidate, dict[str, float]]]] | None = None
+    #: Other hypotheses that answer to first order as this one does, and where their fits start
+    twins: tuple[tuple[Candidate, dict[str, float]], ...] = ()
     curved: bool = False  # its amounts bend the valleys of a fit: a force by a power of the motion
     everywhere: bool = False  # every rig has some of it: only how much is a question
     per_amount: float = 0.0  # its other numbers come to no more than so much of the first; 0: to anything

@@ -20,7 +20,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.beyond import Beyond, Columns
-from rig_identification.mismatch.places import TERMS, Best, best_place, lines, multiplied
+from rig_identification.mismatch.places import TERMS, Best, best_place, lines, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import (
     DAMPING,
@@ -70,6 +70,72 @@ def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
             ridden = _ridden(Swing(directions, frequency), DAMPING, k, found, responses, mass)
             if ridden is not None:
                 yield ridden
+
+
+def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden | None:
+    """A part on springs that moves along all three axes, each with the frequency that explains most.
+
+    One frequency after the other, from the axis that explains most by itself. mass: kg, of the body.
+    """
+    alone = {axis: _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,)) for axis in AXES}
+    columns = {axis: beyond.of(responses) for axis, responses in alone.items()}
+
+    def of(chosen: dict[str, int]) -> Ridden | None:
+        parts = {a: slice(TERMS * k, TERMS * (k + 1)) for a, k in chosen.items()}
+        found = [columns[a].part(part) for a, part in parts.items()]
+        both = Columns(
+            np.sum([c.seen for c in found], axis=0),
+            np.sum([c.solved for c in found], axis=0),
+            np.sum([c.right for c in found], axis=0),
+        )
+        responses = [
+            np.sum([alone[a][i][:, part] for a, part in parts.items()], axis=0)
+            for i in range(len(problem.runs))
+        ]
+        along = tuple(FREQUENCIES[chosen.get(a, 0)] for a in AXES)
+        swing = Swing("".join(AXES), min(FREQUENCIES[k] for k in chosen.values()), along)
+        return _ridden(swing, DAMPING, 0, both, responses, mass)
+
+    chosen: dict[str, int] = {}
+    best: Ridden | None = None
+    for _ in AXES:
+        tried = [
+            (of(chosen | {axis: k}), axis, k)
+            for axis in AXES
+            if axis not in chosen
+            for k in range(len(FREQUENCIES))
+        ]
+        likely = [(found.best.gain, axis, k) for found, axis, k in tried if found is not None]
+        if not likely:
+            return None
+        _, axis, k = max(likely)
+        chosen[axis] = k
+        best = of(chosen)
+    return best
+
+
+def other_ways(problem: Problem, beyond: Beyond, known: str, amount: float, at: Array) -> dict[str, float]:
+    """Hz, by axis, with which a part that moves along ``known`` moves along others, where that explains some.
+
+    amount: kg, at the place ``at`` (3,) m: both as fitted along the axis that is known. Of an axis along
+    which it is fixed no frequency explains anything.
+    """
+    u = (at - middle_of(problem.bench.rig)) / spread_of(problem)
+    weights = amount * monomials(u)
+    out = {}
+    for axis in AXES:
+        if axis == known:
+            continue
+        responses = _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,))
+        found, gains = beyond.of(responses), np.zeros(len(FREQUENCIES))
+        for k in range(len(FREQUENCIES)):
+            chosen = slice(TERMS * k, TERMS * (k + 1))
+            columns = found.part(chosen)
+            information = columns.information([r[:, chosen] for r in responses])
+            gains[k] = columns.right @ weights - 0.5 * weights @ information @ weights
+        if np.max(gains) > 0.0:
+            out[axis] = FREQUENCIES[int(np.argmax(gains))]
+    return out
 
 
 def _ridden(

@@ -21,6 +21,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.mismatch.supports import ceiling_candidate
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel
@@ -39,8 +40,9 @@ DIRECTIONS = {"x": ("x",), "y": ("y",), "z": ("z",), "xy": ("x", "y")}
 class Swing:
     """One scanned rider."""
 
-    directions: str  # key of DIRECTIONS
-    frequency: float  # Hz
+    directions: str  # key of DIRECTIONS, or "xyz" where each axis has its own frequency
+    frequency: float  # Hz, the lowest
+    along: tuple[float, ...] = ()  # Hz, of each axis where they differ
 
     @property
     def effect(self) -> str:
@@ -74,6 +76,17 @@ def pieces_of(problem: Problem) -> dict[str, list[int]]:
     return {name: sorted(which, key=lambda i: problem.runs[i].offset) for name, which in groups.items()}
 
 
+def _ceiling_like(problem: Problem, swing: Swing, mass: float) -> tuple[Candidate, dict[str, float]]:
+    """A ceiling that rings with the body at the frequency of a part on springs, and where its fit starts.
+
+    A light one has a compliance of 1/(m w^2) under the body's mass m. mass: kg, of the body.
+    """
+    axis = AXES.index(swing.directions)
+    ceiling = ceiling_candidate(problem.bench.rig, problem.bench.parameters.model, mass, axis)
+    compliance = 1.0 / (mass * (2.0 * np.pi * swing.frequency) ** 2)
+    return ceiling, {f"ceiling.compliance.{swing.directions}": compliance}
+
+
 def rider_candidate(
     problem: Problem, swing: Swing, mass: float, found: float, at: Array
 ) -> tuple[Candidate, dict[str, float]]:
@@ -83,8 +96,12 @@ def rider_candidate(
     """
     size = float(np.max(extent(problem.bench.rig)))
     effect, liquid = swing.effect, swing.effect == "liquid_slosh"
-    axes = DIRECTIONS[swing.directions]
+    axes = tuple(swing.directions)
     middle = middle_of(problem.bench.rig)
+
+    frequencies = {"frequency": swing.frequency}
+    if swing.along:
+        frequencies = {f"frequency.{a}": f for a, f in zip(axes, swing.along, strict=True)}
 
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
         blocks = np.zeros((len(axes), layout.INTERNAL_SIZE))
@@ -93,6 +110,7 @@ def rider_candidate(
         blocks[0, layout.POINT : layout.POINT + 3] = middle
         blocks[0, layout.FREQUENCY], blocks[0, layout.DAMPING_RATIO] = swing.frequency, DAMPING
         blocks[0, layout.PENDULUM] = float(liquid)
+        blocks[: len(swing.along), layout.FREQUENCY] = swing.along
         o = place.internal_block(model.cables, model.internal)
 
         def number(name: str, unit: str, nominal: float, std: float, entry: int, ratio: bool) -> Parameter:
@@ -106,14 +124,20 @@ def rider_candidate(
                 number(f"position.{a}", "m", float(middle[i]), 0.5 * size, layout.POINT + i, False)
                 for i, a in enumerate(AXES)
             ),
-            number("frequency", "Hz", swing.frequency, 0.3, layout.FREQUENCY, True),
+            *(
+                number(name, "Hz", nominal, 0.3, layout.INTERNAL_SIZE * k + layout.FREQUENCY, True)
+                for k, (name, nominal) in enumerate(frequencies.items())
+            ),
             number("damping_ratio", "1", DAMPING, 1.0, layout.DAMPING_RATIO, True),
         )
         return model.with_internal(blocks), parameters
 
     def told(found: Estimates) -> Told:
-        units = {"mass": "kg", "frequency": "Hz", "damping_ratio": "1"}
-        out: Told = {name: (*found.of(f"{effect}.{name}"), unit) for name, unit in units.items()}
+        out: Told = {"mass": (*found.of(f"{effect}.mass"), "kg")}
+        swings = {name.replace(".", "_"): (*found.of(f"{effect}.{name}"), "Hz") for name in frequencies}
+        if swing.along:
+            out["frequency"] = min(swings.values())
+        out |= swings | {"damping_ratio": (*found.of(f"{effect}.damping_ratio"), "1")}
         return out | {f"position_{a}": (*found.of(f"{effect}.position.{a}"), "m") for a in AXES}
 
     thing, advice = {
@@ -122,7 +146,7 @@ def rider_candidate(
             "Fill the tank to the brim or empty it.",
         ),
         "sprung_mass": (
-            f"A part moves on springs along {swing.directions}:",
+            f"A part moves on springs along {', '.join(axes)}:",
             "Block the springs or take the part off.",
         ),
     }[effect]
@@ -131,10 +155,11 @@ def rider_candidate(
         build(problem.bench.parameters.model)[1],
         f"{thing} {{value}} of it.",
         advice,
-        {"channel": None, "axis": None if liquid else swing.directions},
+        {"channel": None, "axis": swing.directions if len(axes) == 1 else None},
         positive=1,
         tell=told,
         build=build,
+        twins=() if len(axes) > 1 else (_ceiling_like(problem, swing, mass),),
     )
     values = {f"{effect}.mass": found}
     values |= {f"{effect}.position.{a}": float(at[i]) for i, a in enumerate(AXES)}

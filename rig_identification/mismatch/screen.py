@@ -11,18 +11,26 @@ many frequencies and directions are tried, add columns of their own (response.py
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
-from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.boxed import Boxed, probed_of
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
-from rig_identification.mismatch.rider_places import Ridden, finer, scanned, spread_of
+from rig_identification.mismatch.rider_places import (
+    Ridden,
+    finer,
+    on_springs_all_ways,
+    other_ways,
+    scanned,
+    spread_of,
+)
 from rig_identification.mismatch.riders import (
     Swing,
     middle_of,
@@ -236,11 +244,20 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
         # A second one of an effect would write its numbers over the first one's
         if f"{effect}.mass" not in taken:
             found.setdefault((effect, ridden.swing.directions), []).append(ridden)
+    every = None
+    if problem.discrepancy is not None and "sprung_mass.mass" not in taken:
+        every = on_springs_all_ways(problem, beyond, mass)
     best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
+    all_ways = [] if every is None else [_ridden_promise(problem, beyond, every, mass)]
     return [
-        _with_elsewhere([_best_near(problem, beyond, peak, mass) for peak in peaks] if k < FINER else peaks)
-        for k, peaks in enumerate(best)
+        *(
+            _with_elsewhere(
+                [_best_near(problem, beyond, peak, mass) for peak in peaks] if k < FINER else peaks
+            )
+            for k, peaks in enumerate(best)
+        ),
+        *all_ways,
     ]
 
 
@@ -306,7 +323,29 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
         gain -= _unearned(problem, beyond, found.columns, best.weights, found.runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
+    if len(found.swing.directions) == 1:
+        candidate = replace(candidate, between=partial(_all_ways, found.swing, mass))
     return Promise(candidate, gain, values | {f"{found.swing.effect}.damping_ratio": found.damping})
+
+
+def _all_ways(
+    swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
+) -> list[tuple[Candidate, dict[str, float]]]:
+    """A part that was fitted along one axis, moving along others too. mass: kg, of the body."""
+    opened = _opened(problem, evaluation, [])
+    if opened is None:
+        return []
+    effect, known = swing.effect, swing.directions
+    values = problem.bench.parameters.named(evaluation.point.theta)
+    amount, at = values[f"{effect}.mass"], np.array([values[f"{effect}.position.{a}"] for a in AXES])
+    ways = other_ways(problem, opened[1], known, amount, at) | {known: values[f"{effect}.frequency"]}
+    if len(ways) == 1:
+        return []
+    axes = "".join(a for a in AXES if a in ways)
+    along = tuple(ways[a] for a in axes)
+    candidate, start = rider_candidate(problem, Swing(axes, min(along), along), mass, amount, at)
+    start |= {f"{effect}.frequency.{a}": f for a, f in ways.items()}
+    return [(candidate, start | {f"{effect}.damping_ratio": values[f"{effect}.damping_ratio"]})]
 
 
 def _unearned(problem: Problem, beyond: Beyond, columns: Columns, amounts: Array, runs: list[Array]) -> float:

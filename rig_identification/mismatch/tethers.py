@@ -132,6 +132,7 @@ def _tether(axes: str, rig: Rig, mass: float) -> Candidate:
         either_way=len(axes),
         tell=partial(_told, axes),
         closer=partial(_hoses, mass),
+        between=partial(_lines, mass),
     )
 
 
@@ -151,6 +152,68 @@ def _hose(axis: str, side: float, rig: Rig, mass: float) -> Candidate:
         either_way=1,
         tell=partial(_told, axis),
     )
+
+
+def _line(rig: Rig, mass: float, reach: Array) -> Candidate:
+    """A hose or wire from a point of the body to one of the room, in any direction.
+
+    reach (3,): m, world, from where its point hangs at rest, where a fit of it starts.
+    """
+    block = layout.effects_offset(len(rig.cables))
+    length = float(np.mean([c.length for c in rig.cables]))
+    weight = mass * rig.gravity
+
+    first, size = block + place.TETHER_STIFFNESS, float(np.max(extent(rig)))
+    amounts = (
+        # The same along each axis: along the hose's line there is but one
+        replace(added("tether.stiffness", "N/m", 0.2 * weight / length, first), also=(first + 1, first + 2)),
+        added("tether.preload", "N", PULL * weight, block + place.TETHER_PRELOAD),
+    )
+    entry = block + place.TETHER_REACH
+    parts = tuple(
+        added(f"tether.reach.{a}", "m", size, entry + i, float(reach[i])) for i, a in enumerate(AXES)
+    )
+    damping = added("tether.damping", "N*s/m", 0.02 * weight / length, block + place.TETHER_DAMPING)
+
+    def told(found: Estimates) -> Told:
+        out: Told = {
+            "stiffness": (*found.of("tether.stiffness"), "N/m"),
+            "preload": (*found.of("tether.preload"), "N"),
+            "damping": (*found.of("tether.damping"), "N*s/m"),
+        }
+        out |= {f"point_{a}": (*found.of(f"tether.point.{a}"), "m") for a in AXES}
+        return out | {f"reach_{a}": (*found.of(f"tether.reach.{a}"), "m") for a in AXES}
+
+    return Candidate(
+        "tether",
+        (*amounts, damping, *parts, *_point(rig)),
+        "A hose or wire runs from the body to a point of the room; it pulls with {told[preload]} at rest and "
+        "has a stiffness of {value}.",
+        ADVICE,
+        {"channel": None, "axis": None},
+        positive=1,
+        either_way=1,
+        tell=told,
+    )
+
+
+def _lines(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:
+    """A hose between two points as a fitted spring has it, along that one's pull at rest."""
+    parameters, theta = problem.bench.parameters, evaluation.point.theta
+    physics = parameters.physics(theta)
+    block = layout.effects_offset(parameters.model.cables)
+    stiffness = physics[block + place.TETHER_STIFFNESS :][:3]
+    pull = physics[block + place.TETHER_PULL :][:3]
+    at = physics[block + place.TETHER_POINT :][:3]
+    size = float(np.linalg.norm(pull))
+    most = float(np.max(stiffness))
+    if most <= 0.0 or size == 0.0:
+        return []
+    reach = HOSE * pull / size
+    known = {"tether.stiffness": most, "tether.preload": size, "tether.damping": 0.0}
+    known |= {f"tether.reach.{a}": float(v) for a, v in zip(AXES, reach, strict=True)}
+    known |= {f"tether.point.{a}": float(v) for a, v in zip(AXES, at, strict=True)}
+    return [(_line(problem.bench.rig, mass, reach), known)]
 
 
 def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:

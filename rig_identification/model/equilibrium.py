@@ -209,3 +209,24 @@ def find_rest(
         J[0, layout.OUT_TENSION :, column] += own_weights(model, x, R, per_density=True)
     state = State(x[:3].copy(), R, np.zeros(3), np.zeros(3), x[12:].copy())
     return Rest(state, tension, outputs, J, converged)
+
+
+def wrench_response(model: RigModel, rest: Rest) -> Array:
+    """(18 + n, 6) derivative of the outputs at ``rest`` in a constant wrench about the datum, body axes.
+
+    The implicit function theorem again: the wrench adds to the first six of the equations at rest.
+    """
+    n = model.cables
+    x, R = rest.state.vector(model.states), np.array(rest.state.R_world_body, order="C")
+    none = np.zeros(0, dtype=np.int64)
+    mount = model.exciter_orientation
+    in_pose, _ = rest_jacobian(model.physics, model.modes, mount, x, R, rest.tension, none)
+    moved = -np.linalg.lstsq(in_pose, np.eye(in_pose.shape[0], 6), rcond=1e-13)[0]
+    in_gravity = skew(R.T @ model.physics[:3]) @ moved[3:6]
+    out = np.zeros((layout.OUT_TENSION + n, 6))
+    out[layout.OUT_POSITION : layout.OUT_POSITION + 3] = moved[:3]
+    out[layout.OUT_ROTATION : layout.OUT_ROTATION + 3] = moved[3:6]
+    out[layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -in_gravity
+    out[layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] = in_gravity
+    out[layout.OUT_TENSION :] = moved[6 : 6 + n]
+    return out

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.mismatch import identify
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel
 from rig_identification.result import Finding, Identification
+from rig_identification.search.identify import identify
 from rig_identification.simulate import SampleRates, SessionSpec, case_spec, simulate_session
 from rig_identification.thesis.case import Case
 

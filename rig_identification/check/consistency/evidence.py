@@ -76,9 +76,12 @@ class Evidence:
         return ReducedSession(self.session.rig, recordings)
 
     def bound(self, devices: frozenset[str]) -> float:
-        """Nats that a hypothesis about these devices can gain at most. "rest": what rest disagrees by."""
+        """Nats that a hypothesis about these devices can gain at most.
+
+        "rest": what the description says of the body at rest, on which the forces of its motion rest as well.
+        """
         if "rest" in devices:
-            return self.plain.parts.get("rest", 0.0)
+            return sum(nats for name, nats in self.plain.parts.items() if _of_the_body(name))
         return self.plain.cost - self.without(devices).cost
 
     def judged(self, hypothesis: Hypothesis, thorough: bool = False, most: float = np.inf) -> Account:
@@ -110,7 +113,8 @@ class Evidence:
     def _beside_rest(self, about: frozenset[str]) -> float:
         """Nats that motion, forces and tracker cost at least under a hypothesis about these devices."""
         account = self.plain if "rest" in about else self.without(about)
-        return account.cost - account.parts.get("rest", 0.0)
+        changed = _of_the_body if "rest" in about else "rest".__eq__
+        return account.cost - sum(nats for name, nats in account.parts.items() if changed(name))
 
     def _body(self, start: Account) -> RestFit:
         """The body at rest by all readings where they agree, else by those that a hypothesis leaves alone."""
@@ -149,6 +153,11 @@ class Evidence:
             motions.append(motion)
             parts |= more
         return Account(rest, tuple(motions), float(sum(parts.values())), parts)
+
+
+def _of_the_body(part: str) -> bool:
+    """Whether a part of the cost depends on the body's mass and where its centre of mass is."""
+    return part == "rest" or part.endswith(".forces")
 
 
 def _readings(recording: Reduced) -> int:

@@ -1,7 +1,8 @@
 """Motion that the body does not show: masses that ride on it, and a ceiling that yields.
 
 Each internal coordinate q moves along a fixed direction d and adds its acceleration to the
-unknowns of dynamics.py. Those of one mass share the numbers of their leader.
+unknowns of dynamics.py. Those of one mass share the numbers of their leader; a part on springs
+may have another frequency f along each direction.
 
 A rider of mass m rests at a (body axes) and is displaced to rho = a + sum d_k q_k. Its own
 equation along d_j, divided by m so that it holds for a massless passenger as well,
@@ -220,6 +221,7 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
                 )
         q, speed = x[BODY_STATE + j], x[BODY_STATE + count + j]
         along = dx * sx + dy * sy + dz * sz
+        omega = 2.0 * math.pi * physics[(lead if physics[o + FREQUENCY].real == 0.0 else o) + FREQUENCY]
         r[row] = dx * (bx - cx) + dy * (by - cy) + dz * (bz - cz) - 2.0 * zeta * omega * along
         if not hangs:
             r[row] -= omega * omega * q

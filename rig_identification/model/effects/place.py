@@ -40,7 +40,9 @@ TETHER_REACH = 51  # 3: m, world: from the body's point at rest to the wall; all
 LAW_POINT = 54  # 3: m, body
 LAW_DIRECTION = 57  # 2: rad, azimuth and elevation of the spring's line in the world
 LAW_NARROW = 59  # 1/m^2: how fast the brake fades away from where its point hangs at rest
-EFFECTS_SIZE = 60
+TETHER_DAMPING = 60  # N s/m, along a taut tether
+TETHER_PRELOAD = 61  # N: pull of a taut tether at rest, beside what TETHER_PULL has along it
+EFFECTS_SIZE = 62
 
 
 def effects_block(cables: int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.effects.place import REFERENCE_POSITION, REFERENCE_ROTATION
+from rig_identification.model.layout import RATE, VELOCITY
 
 
 @njit(cache=True, inline="always")
@@ -24,6 +25,19 @@ def _along(physics, block, point, x, R, i):  # type: ignore[no-untyped-def]
     for j in range(3):
         moved += (R[i, j] - physics[t + j]) * physics[a + j]
     return moved
+
+
+@njit(cache=True, inline="always")
+def velocity_of(physics, entry, x, R):  # type: ignore[no-untyped-def]
+    """(3,) m/s, world, of the point (m, body) at ``entry`` of the physics."""
+    ax, ay, az = physics[entry], physics[entry + 1], physics[entry + 2]
+    wx, wy, wz = x[RATE], x[RATE + 1], x[RATE + 2]
+    sx, sy, sz = wy * az - wz * ay, wz * ax - wx * az, wx * ay - wy * ax
+    return (
+        x[VELOCITY] + R[0, 0] * sx + R[0, 1] * sy + R[0, 2] * sz,
+        x[VELOCITY + 1] + R[1, 0] * sx + R[1, 1] * sy + R[1, 2] * sz,
+        x[VELOCITY + 2] + R[2, 0] * sx + R[2, 1] * sy + R[2, 2] * sz,
+    )
 
 
 @njit(cache=True, inline="always")

@@ -28,6 +28,7 @@ from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.without_frame import subtract_frame
 from rig_identification.mismatch.budget import SECONDS, Budget
 from rig_identification.mismatch.explain import explain
+from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
@@ -35,6 +36,7 @@ from rig_identification.mismatch.stretched_at_first import with_stretch_told
 from rig_identification.mismatch.watched import Watched, explain_watched
 from rig_identification.recording import Session
 from rig_identification.result import Identification
+from rig_identification.search.search import search
 
 Progress = Callable[[str, float], None]
 
@@ -120,6 +122,29 @@ def _worth_a_search(watched: Watched) -> bool:
     return watched.mismatch.verdict == "unexplained" and misfit(watched.fitted.evaluation) < HOPELESS_SQUARE
 
 
+def _followed(ideal: Ideal, notify: Progress, budget: Budget) -> Explained | None:
+    """What explains the session with a random wrench on the way; None where nothing does, or no fit holds."""
+    try:
+        return search(ideal, notify, budget)[0]
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _answered(ideal: Ideal, found: Explained | None) -> bool:
+    """Whether nothing is left to be explained."""
+    verdict = ideal.mismatch.verdict if found is None else found.mismatch.verdict
+    return verdict != "unexplained"
+
+
+def _answer_with(found: Explained, session: Session, ideal: Ideal) -> Identification:
+    """The answer with what was found in the model."""
+    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+    answer = compose(
+        session, found.fitted, scores(found.fitted), found.mismatch, None, found.loose, found.bodies
+    )
+    return replace(answer, figures={**answer.figures, "ideal": plain})
+
+
 def _identified(
     session: Session, notify: Progress, assumed: Assumed | None, seconds: float
 ) -> tuple[Identification, Fitted]:
@@ -134,8 +159,15 @@ def _identified(
     budget = Budget(seconds)
     fitted = fit_session(session, fitting, assumed)
     ideal = Ideal(fitted, *judged(fitted))
-    spells = spells_of(fitted)
+    spells, named = spells_of(fitted), None
+    # What is only watched tells no wrench, and through a slack spell none goes on
+    followed = bool(fitted.problem.runs) and not spells and not only_watched(fitted.problem)
     if not spells and not near_noise(fitted):
+        if followed:
+            # Where much is left a model follows the data with a discrepancy, and none has to by itself
+            named = _followed(ideal, searching, budget)
+            if named is not None and named.wholly:
+                return _answer_with(named, session, ideal), fitted
         ideal = with_pieces(ideal, fitting)
     plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
     swinging = None
@@ -154,6 +186,10 @@ def _identified(
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
     if swinging is not None and (found is None or not (found.told or found.mismatch.verdict == "none")):
         return swinging, fitted
+    if followed and near_noise(fitted) and not _answered(ideal, found):
+        named = _followed(ideal, searching, budget)
+    if named is not None and not _answered(ideal, found):
+        return _answer_with(named, session, ideal), fitted
     if found is None:
         ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)

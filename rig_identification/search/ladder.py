@@ -1,0 +1,137 @@
+"""A model fitted with its discrepancy as a random wrench, level by level, down to what the evidence asks for.
+
+At a strong wrench the residuals are innovations about a motion that follows the data: nearly linear in all
+parameters, so that Gauss and Newton's steps find their valley from anywhere. The evidence then tells how weak
+the wrench may be. Where it asks for none the model explains the fitted runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig_identification.estimate.solve import (
+    Evaluation,
+    Point,
+    Problem,
+    evaluate,
+    left_to_go,
+    moved_by,
+    promised_by,
+    solve,
+    still_promised,
+)
+from rig_identification.mismatch.trial import log_evidence, mass_of
+from rig_identification.search.levels import ALONE, at_level
+from rig_identification.search.path import followed, found_from
+
+#: Gain (nats) that a step has to promise: less does not tell models apart.
+WORTH = 2.0
+#: Steps at each level on the way down, and where the way ends.
+PASSING, STAYING = 2, 6
+#: Parts of a step that are tried where all of it does not pay.
+SHORTER = (1.0, 0.3, 0.1)
+#: How far (nats) the cost may rise in a step: relinearised, it is another one by about as much.
+JITTER = 1.0
+#: Steps of the fit of a model alone.
+ALONE_STEPS = 20
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model fitted at one level of its discrepancy."""
+
+    problem: Problem  # with the discrepancy
+    evaluation: Evaluation
+    level: int
+
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood less a constant."""
+        return log_evidence(self.evaluation)
+
+    @property
+    def within_reach(self) -> float:
+        """Evidence, and what a full step still promises of it: fits of few steps are compared by both."""
+        return self.evidence + max(0.0, still_promised(self.problem, self.evaluation))
+
+    @property
+    def alone(self) -> bool:
+        """Whether the model needs no wrench beside it."""
+        return self.level == ALONE
+
+    @property
+    def model(self) -> Problem:
+        """The problem without the discrepancy."""
+        return replace(self.problem, discrepancy=None)
+
+
+def begun(problem: Problem, point: Point) -> Rung | None:
+    """A model at its own level, from a first guess; None where not even the strongest wrench follows."""
+    mass = float(problem.bench.parameters.elements(point.theta)[0])
+    strongest = at_level(problem, mass, 0)
+    found = found_from(strongest, point)
+    return None if found is None else walked_down(problem, found, 0)
+
+
+def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
+    """The model at the level that the evidence asks for, from ``level`` on; None where it cannot be fitted.
+
+    point: with the wrenches of that level.
+    """
+    best: Rung | None = None
+    while level <= ALONE:
+        rung = fitted_at(problem, point, level, PASSING)
+        if rung is not None and best is not None and rung.evidence < best.evidence:
+            # Only where a fit to its end says so is a weaker wrench less likely
+            rung = fitted_at(problem, rung.evaluation.point, level, STAYING)
+        if rung is None or (best is not None and rung.evidence < best.evidence):
+            break
+        best, point, level = rung, rung.evaluation.point, level + 1
+    return best
+
+
+def fitted_at(problem: Problem, point: Point, level: int, steps: int) -> Rung | None:
+    """The model fitted in so many steps at one level; None where it cannot be followed there."""
+    try:
+        if level == ALONE:
+            alone = replace(problem, discrepancy=None)
+            evaluation, _ = solve(alone, replace(point, latents=()), iterations=ALONE_STEPS, tolerance=0.05)
+            return Rung(alone, evaluation, level)
+        mass = float(problem.bench.parameters.elements(point.theta)[0])
+        found = _stepped(at_level(problem, mass, level), point, steps)
+        return None if found is None else Rung(at_level(problem, mass, level), found, level)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _stepped(problem: Problem, point: Point, steps: int) -> Evaluation | None:
+    there = followed(problem, point)
+    current = None if there is None else evaluate(problem, there)
+    for _ in range(steps):
+        if current is None:
+            return None
+        step = left_to_go(problem, current)
+        if promised_by(current, step) < WORTH:
+            break
+        better = _paying(problem, current, step)
+        if better is None:
+            break
+        current = better
+    return current
+
+
+def _paying(problem: Problem, current: Evaluation, step: np.ndarray) -> Evaluation | None:
+    """As much of a step as pays, with each run's wrench smoothed again; None where nothing of it does."""
+    for part in SHORTER:
+        there = followed(problem, moved_by(problem, current, part * step))
+        new = None if there is None else evaluate(problem, there)
+        if new is not None and new.cost < current.cost + JITTER:
+            return new
+    return None
+
+
+def mass_at(rung: Rung) -> float:
+    """Mass of the body as fitted, kg."""
+    return mass_of(rung.problem, rung.evaluation)

@@ -1,0 +1,227 @@
+"""The search: screened where the model at hand stands, the best fitted, the likeliest kept, until enough.
+
+All hypotheses are compared by one number, the evidence, each with the discrepancy that it asks for itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.observability import inertial_estimate
+from rig_identification.estimate.solve import Point, Problem, excess
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, net_gain
+from rig_identification.mismatch.one_more import one_more
+from rig_identification.mismatch.screen import Promise, carried, extended, screen, with_reference
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial, promised
+from rig_identification.mismatch.whole_runs import fitted_whole, pruned
+from rig_identification.model.motion import State
+from rig_identification.search.ladder import Rung, begun, fitted_at, mass_at, walked_down
+from rig_identification.search.levels import ALONE
+
+Notify = Callable[[str, float], None]
+
+#: Effects that are told of a session at most.
+MOST_EFFECTS = 3
+#: Hypotheses that are fitted after each screening, of each kind so many, and how many to their own level.
+FITTED, ALIKE, WALKED = 5, 2, 3
+#: Share of the best promise that another one has to come to.
+SHARE = 0.1
+#: Log evidence by which a hypothesis trails at the same level (odds of 1 to 20,000) that is no rival.
+RIVAL = 10.0
+#: Steps of the first fit of each: an amount as large as it may be takes three or four to settle.
+FIRST_STEPS = 4
+#: The level from which on whole runs are fitted without a discrepancy: a stronger one is no trace.
+NEARLY_ALONE = ALONE - 2
+#: Log evidence beyond the logarithm of the number of hypotheses that an effect has to gain.
+NEEDED = 5.0
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Effects in the model, and the model at its own level."""
+
+    rung: Rung
+    found: tuple[Candidate, ...] = ()
+
+
+def search(ideal: Ideal, notify: Notify, budget: Budget) -> tuple[Explained | None, Rung | None]:
+    """What explains the session, but for a trace perhaps, None where nothing does; and the last model."""
+    fitted = ideal.fitted
+    problem = with_reference(replace(fitted.problem, discrepancy=None), fitted.rest)
+    notify("search: the motion as recorded", 0.05)
+    point = fitted.guess or fitted.evaluation.point
+    first = begun(problem, replace(point, latents=()))
+    if first is None:
+        return None, None
+    candidates = catalogue(problem)
+    standing, best_told = Standing(first), None
+    for step in range(MOST_EFFECTS):
+
+        def say(label: str, step: int = step) -> None:
+            notify(f"search: {label}", (step + 0.5) / (MOST_EFFECTS + 1))
+
+        children = _children(standing, candidates, say)
+        if not children:
+            break
+        best = children[0]
+        if best.rung.evidence < standing.rung.evidence + NEEDED + np.log(count_of(candidates)):
+            break
+        weaker = best.rung.level > standing.rung.level or standing.rung.alone
+        standing = best
+        if not weaker:
+            # What is left out takes the wrench's place: this stands in for a part of it
+            break
+        if standing.rung.level < NEARLY_ALONE:
+            continue
+        say("whole runs with " + ", ".join(c.label for c in standing.found))
+        told = _whole(ideal, problem, standing, children[1:], candidates, notify, budget)
+        if told is not None and told.wholly:
+            return told, standing.rung
+        if told is not None and told.told:
+            best_told = told
+    return best_told, standing.rung
+
+
+def _children(standing: Standing, candidates: list[Candidate], say: Callable[[str], None]) -> list[Standing]:
+    """Models with one more effect, each at its own level, likeliest first."""
+    rung = standing.rung
+    left = compatible(candidates, list(standing.found))
+    say("screening")
+    promises = screen(rung.problem, rung.evaluation, left, mass_at(rung))
+    first: list[Standing] = []
+    for candidate, values in _with_twins(worthy(promises, count_of(candidates))):
+        say(candidate.label)
+        wide, point = _with(rung, candidate, values)
+        there = fitted_at(wide, point, rung.level, FIRST_STEPS)
+        if there is not None:
+            first.append(Standing(there, (*standing.found, candidate)))
+    first.sort(key=lambda child: -child.rung.within_reach)
+    walked: list[Standing] = []
+    for child in first[:WALKED]:
+        explains = [w.found[-1].kind for w in walked if w.rung.alone]
+        if explains and child.rung.within_reach < first[0].rung.evidence - RIVAL:
+            break
+        if child.found[-1].kind in explains:
+            # The same effect, of which a closer description explains all
+            continue
+        say(child.found[-1].label)
+        down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
+        if down is not None:
+            walked.append(replace(child, rung=down))
+            walked += _closer(rung, walked[-1], say)
+    return sorted(walked, key=lambda s: -s.rung.evidence)
+
+
+def _with_twins(promises: list[Promise]) -> Iterator[tuple[Candidate, dict[str, float]]]:
+    """What is fitted of each promise and where from: itself, and what first order cannot tell from it."""
+    for promise in promises:
+        yield promise.candidate, promise.values
+        yield from promise.candidate.twins
+
+
+def worthy(promises: list[Promise], count: int) -> list[Promise]:
+    """The promises worth a fit: of each kind the best ones, as many as are fitted."""
+    out: list[Promise] = []
+    for promise in sorted(promises, key=lambda p: -net_gain(p, count)):
+        if net_gain(promise, count) <= 0.0 or len(out) == FITTED:
+            break
+        if out and promise.gain < SHARE * out[0].gain:
+            break
+        if sum(promise.candidate.kind == other.candidate.kind for other in out) < ALIKE:
+            out.append(promise)
+    return out
+
+
+def _with(rung: Rung, candidate: Candidate, values: dict[str, float]) -> tuple[Problem, Point]:
+    """The model with one more effect, started at ``values``."""
+    wide = extended(rung.problem, (candidate,))
+    point = carried(wide, rung.problem, rung.evaluation.point)
+    return wide, promised(wide, point, candidate, values, rung.evaluation)
+
+
+def _closer(parent: Rung, standing: Standing, say: Callable[[str], None]) -> Iterator[Standing]:
+    """The model with closer descriptions of its last effect that first order cannot tell from it.
+
+    They take the place of that effect in the model without it, ``parent``'s.
+    """
+    candidate, rung = standing.found[-1], standing.rung
+    asked = candidate.between or candidate.closer
+    if asked is None:
+        return
+    for closer, values in asked(rung.problem, rung.evaluation):
+        say(closer.label)
+        wide = extended(parent.problem, (closer,))
+        point = carried(wide, rung.problem, _without_last(parent, rung.evaluation.point))
+        down = walked_down(wide, promised(wide, point, closer, values, rung.evaluation), rung.level)
+        if down is not None:
+            yield Standing(down, (*standing.found[:-1], closer))
+
+
+def _without_last(parent: Rung, point: Point) -> Point:
+    """The point without what the last effect moves within the rig."""
+    kept = parent.problem.bench.parameters.model.internal
+
+    def own(state: State) -> State:
+        count = state.internal.size // 2
+        return replace(state, internal=np.concatenate([state.internal[:kept], state.internal[count:][:kept]]))
+
+    return replace(
+        point, starts=tuple(map(own, point.starts)), rest_guesses=tuple(map(own, point.rest_guesses))
+    )
+
+
+def _whole(
+    ideal: Ideal,
+    problem: Problem,
+    standing: Standing,
+    others: list[Standing],
+    candidates: list[Candidate],
+    notify: Notify,
+    budget: Budget,
+) -> Explained | None:
+    """Whole runs with what was found, judged on held-out ones; beside it what explains them as well."""
+    rung = standing.rung
+    label = standing.found[-1].label
+    alike = [
+        (rung.evidence - o.rung.evidence, o)
+        for o in others
+        if o.rung.level >= rung.level and o.found[-1].label != label
+    ]
+    found = [_trial(standing, c) for c in standing.found]
+    rivals = [(gap, _trial(other, other.found[-1])) for gap, other in alike]
+    search_ = Search(
+        problem,
+        rung.model,
+        rung.evaluation,
+        excess(ideal.fitted.evaluation),
+        budget,
+        found=found,
+        rivals=[rival(trial, gap) for gap, trial in rivals],
+        bodies=tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in rivals),
+    )
+    try:
+        best = fitted_whole(ideal, search_, found, rung.model, found[0].evaluation.point)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    if not best.wholly:
+        return best
+    kept = pruned(best, search_, len(candidates))
+    if kept is not best or len(found) == MOST_EFFECTS or budget.spent():
+        return kept
+    return one_more(ideal, search_, kept, compatible(candidates, list(standing.found)), notify)
+
+
+def _trial(standing: Standing, candidate: Candidate) -> Trial:
+    """One effect of a model, as the search of fits without a discrepancy has it."""
+    rung = standing.rung
+    there = replace(rung.evaluation, point=replace(rung.evaluation.point, latents=()))
+    return Trial(candidate, rung.model, there, rung.evidence)
