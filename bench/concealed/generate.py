@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -60,7 +61,7 @@ def make_session(
     The same arguments give the same session, bit for bit, on the same machine.
     """
     if world == "labs":
-        drawn = _labs(seed, kind, size, duration, rig, given or {}, engine)
+        drawn = _until_it_runs(partial(_lab, seed, kind, size, duration, rig, given or {}, engine))
     elif rig or given or engine != "mujoco":
         raise ValueError("rig, given and engine are for the world of labs")
     else:
@@ -126,19 +127,11 @@ def _first(seed: int, kind: str, size: float | None, duration: float) -> Drawn:
     return Drawn(ideal, paths, *with_effects(ideal, paths, effects), base=[])
 
 
-def _labs(
-    seed: int,
-    kind: str,
-    size: float | None,
-    duration: float,
-    rig: str | None,
-    given: Mapping[str, Any],
-    engine: str,
-) -> Drawn:
-    """As labs have it. A rig or effect that cannot be run is drawn again."""
+def _until_it_runs(draw: Callable[[int], Drawn]) -> Drawn:
+    """What an attempt draws; a rig or effect that cannot be run is drawn again."""
     for attempt in range(ATTEMPTS):
         try:
-            return _lab(seed, kind, size, duration, rig, given, engine, attempt)
+            return draw(attempt)
         except RuntimeError as error:
             told = error
     raise told
@@ -154,6 +147,7 @@ def _lab(
     engine: str,
     attempt: int,
 ) -> Drawn:
+    """As labs have it."""
     # Kind and rig are those of the seed, whatever the attempt.
     rng = np.random.default_rng([seed, 6])
     chosen = choose(rng, kind)

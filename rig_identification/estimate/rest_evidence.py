@@ -145,8 +145,7 @@ def linearise_rest(
     in_physics = parameters.physics_jacobian(theta)
     device_columns, entries, scale = parameters.device_columns()
     R = rest.state.R_world_body[None]
-    residuals, jacobians, predictions, in_wrenches = [], [], [], []
-    in_wrench = np.zeros((0, 6)) if discrepancy is None else wrench_response(model, rest)
+    residuals, jacobians, predictions, in_raw = [], [], [], []
     log_spread = 0.0
     for channel in evidence.channels:
         reading = read_device(bench, channel.device, rest.outputs, R, own, channel.time)
@@ -157,8 +156,7 @@ def linearise_rest(
             if first <= entry < first + reading.in_device.shape[2]:
                 jacobian[:, column] += s * reading.in_device[0, channel.columns, entry - first]
         deviation = np.sqrt(channel.variance)
-        if discrepancy is not None:
-            in_wrenches.append(reading.in_raw[0, channel.columns] @ in_wrench / deviation[:, None])
+        in_raw.append(reading.in_raw[0, channel.columns] / deviation[:, None])
         residuals.append((channel.mean - predicted) / deviation)
         jacobians.append(jacobian / deviation[:, None])
         predictions.append(predicted)
@@ -167,7 +165,7 @@ def linearise_rest(
         return None
     residual, jacobian = np.concatenate(residuals), np.concatenate(jacobians)
     if discrepancy is not None:
-        felt = np.concatenate(in_wrenches)
+        felt = np.concatenate(in_raw) @ wrench_response(model, rest)
         factor = np.linalg.cholesky(np.eye(residual.size) + felt @ discrepancy.covariance @ felt.T)
         residual = np.asarray(np.linalg.solve(factor, residual), dtype=np.float64)
         jacobian = np.asarray(np.linalg.solve(factor, jacobian), dtype=np.float64)

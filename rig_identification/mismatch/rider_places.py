@@ -55,12 +55,16 @@ class Ridden:
     runs: list[Array]  # (m, TERMS) its columns in every run
 
 
-def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
+def along_each(problem: Problem, beyond: Beyond) -> dict[str, list[Array]]:
+    """(m, TERMS F) what a kilogram at every frequency does to every run's samples, by its axis."""
+    return {axis: _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,)) for axis in AXES}
+
+
+def scanned(beyond: Beyond, alone: dict[str, list[Array]], mass: float) -> Iterator[Ridden]:
     """Every swing where it explains most, as far as any mass of it promises something.
 
-    mass: kg, of the body.
+    alone: of :func:`along_each`. mass: kg, of the body.
     """
-    alone = {axis: _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,)) for axis in AXES}
     for directions, axes in DIRECTIONS.items():
         responses = alone[axes[0]]
         for axis in axes[1:]:
@@ -72,12 +76,12 @@ def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
                 yield ridden
 
 
-def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden | None:
+def on_springs_all_ways(beyond: Beyond, alone: dict[str, list[Array]], mass: float) -> Ridden | None:
     """A part on springs that moves along all three axes, each with the frequency that explains most.
 
-    One frequency after the other, from the axis that explains most by itself. mass: kg, of the body.
+    One frequency after the other, from the axis that explains most by itself. alone: of :func:`along_each`.
+    mass: kg, of the body.
     """
-    alone = {axis: _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,)) for axis in AXES}
     columns = {axis: beyond.of(responses) for axis, responses in alone.items()}
 
     def of(chosen: dict[str, int]) -> Ridden | None:
@@ -90,7 +94,7 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
         )
         responses = [
             np.sum([alone[a][i][:, part] for a, part in parts.items()], axis=0)
-            for i in range(len(problem.runs))
+            for i in range(len(beyond.full.runs))
         ]
         along = tuple(FREQUENCIES[chosen.get(a, 0)] for a in AXES)
         swing = Swing("".join(AXES), min(FREQUENCIES[k] for k in chosen.values()), along)
@@ -110,7 +114,7 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
             return None
         _, axis, k = max(likely)
         chosen[axis] = k
-        best = of(chosen)
+        best = next(found for found, a, i in tried if (a, i) == (axis, k))
     return best
 
 
@@ -129,21 +133,25 @@ def other_ways(problem: Problem, beyond: Beyond, known: str, amount: float, at: 
         responses = _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,))
         found, gains = beyond.of(responses), np.zeros(len(FREQUENCIES))
         for k in range(len(FREQUENCIES)):
-            chosen = slice(TERMS * k, TERMS * (k + 1))
-            columns = found.part(chosen)
-            information = columns.information([r[:, chosen] for r in responses])
+            columns, own = _one_of(found, responses, k)
+            information = columns.information(own)
             gains[k] = columns.right @ weights - 0.5 * weights @ information @ weights
         if np.max(gains) > 0.0:
             out[axis] = FREQUENCIES[int(np.argmax(gains))]
     return out
 
 
+def _one_of(found: Columns, responses: list[Array], k: int) -> tuple[Columns, list[Array]]:
+    """The ``k``-th of several swings' columns, and what they are in every run."""
+    chosen = slice(TERMS * k, TERMS * (k + 1))
+    return found.part(chosen), [r[:, chosen] for r in responses]
+
+
 def _ridden(
     swing: Swing, damping: float, k: int, found: Columns, responses: list[Array], mass: float
 ) -> Ridden | None:
     """The best place of the ``k``-th of several swings in the columns ``found``, which are ``responses``."""
-    chosen = slice(TERMS * k, TERMS * (k + 1))
-    columns, own = found.part(chosen), [r[:, chosen] for r in responses]
+    columns, own = _one_of(found, responses, k)
     best = best_place(
         columns.information(own).reshape(1, TERMS, 1, TERMS),
         columns.right.reshape(1, TERMS),

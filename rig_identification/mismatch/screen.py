@@ -25,6 +25,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.rider_places import (
     Ridden,
+    along_each,
     finer,
     on_springs_all_ways,
     other_ways,
@@ -239,14 +240,15 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     """The best swing of each direction, of effects that are not in the model already."""
     taken = {p.name for p in problem.bench.parameters.free}
     found: dict[tuple[str, str], list[Ridden]] = {}
-    for ridden in scanned(problem, beyond, mass):
+    alone = along_each(problem, beyond)
+    for ridden in scanned(beyond, alone, mass):
         effect = ridden.swing.effect
         # A second one of an effect would write its numbers over the first one's
         if f"{effect}.mass" not in taken:
             found.setdefault((effect, ridden.swing.directions), []).append(ridden)
     every = None
     if problem.discrepancy is not None and "sprung_mass.mass" not in taken:
-        every = on_springs_all_ways(problem, beyond, mass)
+        every = on_springs_all_ways(beyond, alone, mass)
     best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
     all_ways = [] if every is None else [_ridden_promise(problem, beyond, every, mass)]

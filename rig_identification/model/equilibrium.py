@@ -194,16 +194,11 @@ def find_rest(
     outputs[0, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -down
     outputs[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] = down
     outputs[0, layout.OUT_TENSION :] = tension + own_weights(model, x, R)
-    J = np.zeros((1, layout.OUT_TENSION + n, chosen.size))
-    J[0, layout.OUT_POSITION : layout.OUT_POSITION + 3] = implicit[:3]
-    J[0, layout.OUT_ROTATION : layout.OUT_ROTATION + 3] = implicit[3:6]
     in_gravity = skew(down) @ implicit[3:6]
     for k, d in enumerate(chosen):
         if 0 <= d < 3:
             in_gravity[:, k] += R[d]
-    J[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] = in_gravity
-    J[0, layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -in_gravity
-    J[0, layout.OUT_TENSION :] = implicit[6 : 6 + n]
+    J = _in_outputs(implicit, in_gravity, n)[None]
     density = layout.effects_offset(n) + LINEAR_DENSITY
     for column in np.flatnonzero(chosen == density):
         J[0, layout.OUT_TENSION :, column] += own_weights(model, x, R, per_density=True)
@@ -223,7 +218,15 @@ def wrench_response(model: RigModel, rest: Rest) -> Array:
     in_pose, _ = rest_jacobian(model.physics, model.modes, mount, x, R, rest.tension, none)
     moved = -np.linalg.lstsq(in_pose, np.eye(in_pose.shape[0], 6), rcond=1e-13)[0]
     in_gravity = skew(R.T @ model.physics[:3]) @ moved[3:6]
-    out = np.zeros((layout.OUT_TENSION + n, 6))
+    return _in_outputs(moved, in_gravity, n)
+
+
+def _in_outputs(moved: Array, in_gravity: Array, n: int) -> Array:
+    """(18 + n, d) derivative of the outputs at rest of ``n`` cables.
+
+    moved (6 + n + s, d): of pose, tensions, internal coordinates. in_gravity (3, d): of gravity, body axes.
+    """
+    out = np.zeros((layout.OUT_TENSION + n, moved.shape[1]))
     out[layout.OUT_POSITION : layout.OUT_POSITION + 3] = moved[:3]
     out[layout.OUT_ROTATION : layout.OUT_ROTATION + 3] = moved[3:6]
     out[layout.OUT_SPECIFIC_FORCE : layout.OUT_SPECIFIC_FORCE + 3] = -in_gravity

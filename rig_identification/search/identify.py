@@ -136,11 +136,11 @@ def _answered(ideal: Ideal, found: Explained | None) -> bool:
     return verdict != "unexplained"
 
 
-def _answer_with(found: Explained, session: Session, ideal: Ideal) -> Identification:
-    """The answer with what was found in the model."""
-    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+def _answer_with(found: Explained, session: Session, plain: Identification) -> Identification:
+    """The answer with what was found in the model. plain: the ideal model's."""
+    careful = None if found.told else found.ideal.careful
     answer = compose(
-        session, found.fitted, scores(found.fitted), found.mismatch, None, found.loose, found.bodies
+        session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
     )
     return replace(answer, figures={**answer.figures, "ideal": plain})
 
@@ -167,7 +167,8 @@ def _identified(
             # Where much is left a model follows the data with a discrepancy, and none has to by itself
             named = _followed(ideal, searching, budget)
             if named is not None and named.wholly:
-                return _answer_with(named, session, ideal), fitted
+                plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+                return _answer_with(named, session, plain), fitted
         ideal = with_pieces(ideal, fitting)
     plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
     swinging = None
@@ -189,7 +190,7 @@ def _identified(
     if followed and near_noise(fitted) and not _answered(ideal, found):
         named = _followed(ideal, searching, budget)
     if named is not None and not _answered(ideal, found):
-        return _answer_with(named, session, ideal), fitted
+        return _answer_with(named, session, plain), fitted
     if found is None:
         ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
@@ -199,8 +200,4 @@ def _identified(
             session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies
         )
         return stated, fitted
-    careful = None if found.told else found.ideal.careful
-    answer = compose(
-        session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
-    )
-    return replace(answer, figures={**answer.figures, "ideal": plain}), fitted
+    return _answer_with(found, session, plain), fitted

@@ -22,7 +22,7 @@ from rig_identification.estimate.solve import (
     solve,
     still_promised,
 )
-from rig_identification.mismatch.trial import log_evidence, mass_of
+from rig_identification.mismatch.trial import log_evidence
 from rig_identification.search.levels import ALONE, at_level
 from rig_identification.search.path import followed, found_from
 
@@ -69,9 +69,7 @@ class Rung:
 
 def begun(problem: Problem, point: Point) -> Rung | None:
     """A model at its own level, from a first guess; None where not even the strongest wrench follows."""
-    mass = float(problem.bench.parameters.elements(point.theta)[0])
-    strongest = at_level(problem, mass, 0)
-    found = found_from(strongest, point)
+    found = found_from(_at(problem, point, 0), point)
     return None if found is None else walked_down(problem, found, 0)
 
 
@@ -95,15 +93,19 @@ def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
 def fitted_at(problem: Problem, point: Point, level: int, steps: int) -> Rung | None:
     """The model fitted in so many steps at one level; None where it cannot be followed there."""
     try:
+        here = _at(problem, point, level)
         if level == ALONE:
-            alone = replace(problem, discrepancy=None)
-            evaluation, _ = solve(alone, replace(point, latents=()), iterations=ALONE_STEPS, tolerance=0.05)
-            return Rung(alone, evaluation, level)
-        mass = float(problem.bench.parameters.elements(point.theta)[0])
-        found = _stepped(at_level(problem, mass, level), point, steps)
-        return None if found is None else Rung(at_level(problem, mass, level), found, level)
+            evaluation, _ = solve(here, replace(point, latents=()), iterations=ALONE_STEPS, tolerance=0.05)
+            return Rung(here, evaluation, level)
+        found = _stepped(here, point, steps)
+        return None if found is None else Rung(here, found, level)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
+
+
+def _at(problem: Problem, point: Point, level: int) -> Problem:
+    """The problem with a discrepancy of that level for the body as ``point`` has it."""
+    return at_level(problem, float(problem.bench.parameters.elements(point.theta)[0]), level)
 
 
 def _stepped(problem: Problem, point: Point, steps: int) -> Evaluation | None:
@@ -130,8 +132,3 @@ def _paying(problem: Problem, current: Evaluation, step: np.ndarray) -> Evaluati
         if new is not None and new.cost < current.cost + JITTER:
             return new
     return None
-
-
-def mass_at(rung: Rung) -> float:
-    """Mass of the body as fitted, kg."""
-    return mass_of(rung.problem, rung.evaluation)

@@ -13,9 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.prediction import Linearised, model_at, start_basis
+from rig_identification.estimate.prediction import Linearised, model_at, smoothed, start_basis
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, shortened
-from rig_identification.estimate.whitening import smooth
 from rig_identification.model.motion import RigModel, State, on_cables
 
 Array = NDArray[np.float64]
@@ -28,17 +27,13 @@ ROUNDS, STAYS = 5, 1.0
 PLACE, SPEED = 0.05, 0.2
 
 
-def followed(problem: Problem, point: Point, rounds: int = 1) -> Point | None:
+def followed(problem: Problem, point: Point) -> Point | None:
     """The point with each run's wrench and start as its recordings tell them; None where none can be told.
 
     The problem has a discrepancy.
     """
-    for _ in range(rounds):
-        there = evaluate(problem, point, residuals_only=True)
-        if there is None:
-            return None
-        point = _smoothed(problem, there)
-    return point
+    there = evaluate(problem, point, residuals_only=True)
+    return None if there is None else _smoothed(problem, there)
 
 
 def _smoothed(problem: Problem, there: Evaluation) -> Point:
@@ -51,23 +46,9 @@ def _of_run(model: RigModel, start: State, run: Linearised) -> tuple[State, Arra
     """Start state and (N, 6) wrench of a run."""
     basis = start_basis(model, start)
     basis = basis / np.linalg.norm(basis, axis=0)
-    free = basis.shape[1] // 2
-    spread = basis * np.repeat([PLACE, SPEED], free)
-    noise = run.noise
-    states, drawn, _ = smooth(
-        run.motion.A,
-        noise.through,
-        noise.Q,
-        run.latent,
-        run.nodes,
-        run.row_H,
-        noise.felt,
-        run.variance,
-        run.plain,
-        spread @ spread.T,
-        noise.follow,
-    )
-    return on_cables(model, start.moved(states[0])), run.latent + drawn[:, :6]
+    spread = basis * np.repeat([PLACE, SPEED], basis.shape[1] // 2)
+    states, wrench, _ = smoothed(run, spread @ spread.T)
+    return on_cables(model, start.moved(states[0])), run.latent + wrench
 
 
 def found_from(problem: Problem, point: Point) -> Point | None:

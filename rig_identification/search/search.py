@@ -21,10 +21,10 @@ from rig_identification.mismatch.hypotheses import catalogue, compatible, count_
 from rig_identification.mismatch.one_more import one_more
 from rig_identification.mismatch.screen import Promise, carried, extended, screen, with_reference
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, promised
+from rig_identification.mismatch.trial import Trial, mass_of, promised
 from rig_identification.mismatch.whole_runs import fitted_whole, pruned
 from rig_identification.model.motion import State
-from rig_identification.search.ladder import Rung, begun, fitted_at, mass_at, walked_down
+from rig_identification.search.ladder import Rung, begun, fitted_at, walked_down
 from rig_identification.search.levels import ALONE
 
 Notify = Callable[[str, float], None]
@@ -96,7 +96,7 @@ def _children(standing: Standing, candidates: list[Candidate], say: Callable[[st
     rung = standing.rung
     left = compatible(candidates, list(standing.found))
     say("screening")
-    promises = screen(rung.problem, rung.evaluation, left, mass_at(rung))
+    promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
     first: list[Standing] = []
     for candidate, values in _with_twins(worthy(promises, count_of(candidates))):
         say(candidate.label)

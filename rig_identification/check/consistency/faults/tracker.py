@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.faults.axes import signed_permutations, written
 from rig_identification.check.consistency.faults.unit import LENGTHS
-from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
+from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
 from rig_identification.check.consistency.measured import Measured, seen
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.examination import SetupFault
@@ -70,17 +70,8 @@ def _place_alone(turn: Array) -> Hypothesis:
     def right(poses: Array, _: str) -> Array:
         return np.concatenate([poses[:, :3] @ turn.T, poses[:, 3:]], axis=1)
 
-    def describe(rest: RestFit | None) -> SetupFault:
-        names = ", ".join(f"{axis} = {source}" for axis, source in zip("xyz", written(turn), strict=True))
-        return fault(
-            "axes",
-            {"channel": "mocap", "part": "position", "permutation": written(turn)},
-            {},
-            "The tracker's positions are in other axes than its orientations.",
-            f"Publish positions as {names} of what is published now.",
-        )
-
-    return Hypothesis(Change({"mocap": right}), describe, ABOUT, variants=47)
+    said = "The tracker's positions are in other axes than its orientations."
+    return _part_alone(turn, "position", right, said, "Publish positions as {} of what is published now.", 47)
 
 
 def _turn_alone(turn: Array) -> Hypothesis:
@@ -90,17 +81,22 @@ def _turn_alone(turn: Array) -> Hypothesis:
         quaternions[known] = turned.as_quat()
         return _turned(poses, quaternions)
 
+    said = "The tracker's orientations are in other axes than its positions."
+    advice = "Turn the orientations into the positions' frame: {} of what is published now."
+    return _part_alone(turn, "orientation", right, said, advice, 23)
+
+
+def _part_alone(
+    turn: Array, part: str, right: Reading, statement: str, advice: str, variants: int
+) -> Hypothesis:
+    """One part of a pose in other axes than the other. advice: with {} for the axes."""
+
     def describe(rest: RestFit | None) -> SetupFault:
         names = ", ".join(f"{axis} = {source}" for axis, source in zip("xyz", written(turn), strict=True))
-        return fault(
-            "axes",
-            {"channel": "mocap", "part": "orientation", "permutation": written(turn)},
-            {},
-            "The tracker's orientations are in other axes than its positions.",
-            f"Turn the orientations into the positions' frame: {names} of what is published now.",
-        )
+        where = {"channel": "mocap", "part": part, "permutation": written(turn)}
+        return fault("axes", where, {}, statement, advice.format(names))
 
-    return Hypothesis(Change({"mocap": right}), describe, ABOUT, variants=23)
+    return Hypothesis(Change({"mocap": right}), describe, ABOUT, variants=variants)
 
 
 def _turned(poses: Array, quaternions: Array) -> Array:
