@@ -10,10 +10,12 @@ from test_model_rigs import random_sample
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.force_noise import Discrepancy
+from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import _begun, _silent, pose_problem
+from rig_identification.estimate.solve import evaluate
 from rig_identification.model.effects import place
 from rig_identification.model.equilibrium import find_rest, wrench_response
-from rig_identification.search.ladder import begun
+from rig_identification.search.ladder import LOST, begun, fitted_at
 from rig_identification.search.levels import ALONE, LEVELS, at_level
 from rig_identification.search.path import found_from
 from rig_identification.simulate import simulate_session
@@ -88,3 +90,26 @@ def test_a_model_that_lacks_nothing_asks_for_no_wrench() -> None:
     rung = begun(start.problem, start.point)
     assert rung is not None
     assert rung.alone
+
+
+def test_a_motion_that_an_effect_lost_is_found_again() -> None:
+    """As where an effect enters with all of its amount beside wrenches that stood in for it."""
+    session, _ = simulate_session(shaken(14, 8.0), np.random.default_rng(6))
+    problem, theta, held = pose_problem(session)
+    start = _begun(problem, theta, held, _silent)
+    mass = float(start.problem.bench.parameters.elements(start.point.theta)[0])
+    weight = mass * problem.bench.rig.gravity
+    pushed = tuple(
+        np.tile([0.3 * weight, 0.2 * weight, 0.0, 0.1 * weight, 0.0, 0.2 * weight], (run.grid.nodes, 1))
+        for run in start.problem.runs
+    )
+    level = 2
+    lost = evaluate(at_level(start.problem, mass, level), replace(start.point, latents=pushed))
+    assert lost is None or misfit(lost) > LOST
+    found = fitted_at(start.problem, replace(start.point, latents=pushed), level, 0)
+    assert found is not None
+    never_lost = found_from(at_level(start.problem, mass, level), start.point)
+    assert never_lost is not None
+    as_well = evaluate(at_level(start.problem, mass, level), never_lost)
+    assert as_well is not None
+    assert misfit(found.evaluation) < 1.05 * misfit(as_well)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.solve import (
     Evaluation,
     Point,
@@ -34,6 +35,8 @@ PASSING, STAYING = 2, 6
 SHORTER = (1.0, 0.3, 0.1)
 #: How far (nats) the cost may rise in a step: relinearised, it is another one by about as much.
 JITTER = 1.0
+#: Mean square residual from which a motion is lost: a wrench half a decade too weak multiplies it by ten.
+LOST = 30.0
 #: Steps of the fit of a model alone.
 ALONE_STEPS = 20
 
@@ -109,8 +112,7 @@ def _at(problem: Problem, point: Point, level: int) -> Problem:
 
 
 def _stepped(problem: Problem, point: Point, steps: int) -> Evaluation | None:
-    there = followed(problem, point)
-    current = None if there is None else evaluate(problem, there)
+    current = _followed(problem, point)
     for _ in range(steps):
         if current is None:
             return None
@@ -122,6 +124,21 @@ def _stepped(problem: Problem, point: Point, steps: int) -> Evaluation | None:
             break
         current = better
     return current
+
+
+def _followed(problem: Problem, point: Point) -> Evaluation | None:
+    """The problem about the motion that the recordings tell, from the wrenches that ``point`` has.
+
+    An effect that enters with all of its amount acts beside wrenches that stood in for it, and within seconds
+    the motion is lost: the wrenches are then found anew.
+    """
+    there = followed(problem, point)
+    current = None if there is None else evaluate(problem, there)
+    if current is not None and misfit(current) < LOST:
+        return current
+    anew = found_from(problem, replace(point, latents=()))
+    other = None if anew is None else evaluate(problem, anew)
+    return min((e for e in (current, other) if e is not None), key=lambda e: e.cost, default=None)
 
 
 def _paying(problem: Problem, current: Evaluation, step: np.ndarray) -> Evaluation | None:

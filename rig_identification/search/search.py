@@ -69,7 +69,7 @@ def search(ideal: Ideal, notify: Notify, budget: Budget) -> tuple[Explained | No
         def say(label: str, step: int = step) -> None:
             notify(f"search: {label}", (step + 0.5) / (MOST_EFFECTS + 1))
 
-        children = _children(standing, candidates, say)
+        children = _children(standing, candidates, say, budget)
         if not children:
             break
         best = children[0]
@@ -91,14 +91,21 @@ def search(ideal: Ideal, notify: Notify, budget: Budget) -> tuple[Explained | No
     return best_told, standing.rung
 
 
-def _children(standing: Standing, candidates: list[Candidate], say: Callable[[str], None]) -> list[Standing]:
-    """Models with one more effect, each at its own level, likeliest first."""
+def _children(
+    standing: Standing, candidates: list[Candidate], say: Callable[[str], None], budget: Budget
+) -> list[Standing]:
+    """Models with one more effect, each at its own level, likeliest first.
+
+    Once the ``budget`` is spent no further hypothesis is fitted.
+    """
     rung = standing.rung
     left = compatible(candidates, list(standing.found))
     say("screening")
     promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
     first: list[Standing] = []
     for candidate, values in _with_twins(worthy(promises, count_of(candidates))):
+        if budget.spent():
+            break
         say(candidate.label)
         wide, point = _with(rung, candidate, values)
         there = fitted_at(wide, point, rung.level, FIRST_STEPS)
@@ -107,6 +114,8 @@ def _children(standing: Standing, candidates: list[Candidate], say: Callable[[st
     first.sort(key=lambda child: -child.rung.within_reach)
     walked: list[Standing] = []
     for child in first[:WALKED]:
+        if walked and budget.spent():
+            break
         explains = [w.found[-1].kind for w in walked if w.rung.alone]
         if explains and child.rung.within_reach < first[0].rung.evidence - RIVAL:
             break
