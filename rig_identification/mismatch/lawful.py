@@ -148,7 +148,7 @@ def law_trial(problem: Problem, evaluation: Evaluation, mass: float, budget: Bud
             best = trial
     if best is None or misfit(best.evaluation) > AT_NOISE:
         return None
-    sparse = _sparse(problem, best, budget)
+    sparse = made_sparse(problem, best, budget)
     seen = in_stds(sparse)
     # What takes away so much and is hardly seen itself stands in for something else
     return sparse if max(abs(seen[q.name]) for q in parts_of(sparse.candidate)) > CERTAIN else None
@@ -190,7 +190,7 @@ def _solved(problem: Problem, point: Point, steps: int, budget: Budget) -> tuple
     return solve(problem, point, iterations=steps, tolerance=0.1, polish=POLISH, stop=budget.spent)
 
 
-def _sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
+def made_sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
     """The trial less the parts of its law that are not seen, one after the other."""
     while True:
         less: Candidate | None = sparser(trial.candidate, in_stds(trial))

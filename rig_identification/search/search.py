@@ -25,6 +25,7 @@ from rig_identification.mismatch.trial import Trial, mass_of, promised
 from rig_identification.mismatch.whole_runs import fitted_whole, pruned
 from rig_identification.model.motion import State
 from rig_identification.search.ladder import Rung, begun, fitted_at, walked_down
+from rig_identification.search.laws import in_words, promised_laws, sparse
 from rig_identification.search.levels import ALONE
 
 Notify = Callable[[str, float], None]
@@ -102,6 +103,7 @@ def _children(
     left = compatible(candidates, list(standing.found))
     say("screening")
     promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
+    promises += promised_laws(rung, standing.found)
     first: list[Standing] = []
     for candidate, values in _with_twins(worthy(promises, count_of(candidates))):
         if budget.spent():
@@ -205,7 +207,7 @@ def _whole(
         for o in others
         if o.rung.level >= rung.level and o.found[-1].label != label
     ]
-    found = [_trial(standing, c) for c in standing.found]
+    found = sparse(problem, [_trial(standing, c) for c in standing.found], budget)
     rivals = [(gap, _trial(other, other.found[-1])) for gap, other in alike]
     search_ = Search(
         problem,
@@ -217,14 +219,23 @@ def _whole(
         rivals=[rival(trial, gap) for gap, trial in rivals],
         bodies=tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in rivals),
     )
+    best = _alone(ideal, search_, candidates, standing, notify)
+    return None if best is None else in_words(best, found)
+
+
+def _alone(
+    ideal: Ideal, search_: Search, candidates: list[Candidate], standing: Standing, notify: Notify
+) -> Explained | None:
+    """Whole runs with what ``search_`` found and no discrepancy; None where they cannot be fitted."""
+    found = search_.found
     try:
-        best = fitted_whole(ideal, search_, found, rung.model, found[0].evaluation.point)
+        best = fitted_whole(ideal, search_, found, found[0].problem, found[0].evaluation.point)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
     if not best.wholly:
         return best
     kept = pruned(best, search_, len(candidates))
-    if kept is not best or len(found) == MOST_EFFECTS or budget.spent():
+    if kept is not best or len(found) == MOST_EFFECTS or search_.budget.spent():
         return kept
     return one_more(ideal, search_, kept, compatible(candidates, list(standing.found)), notify)
 

@@ -1,0 +1,51 @@
+"""Laws without a name on the ladder: screened beside every named effect, made sparse, told in words.
+
+A law (mismatch/point_laws.py) is a force at one point of the body by powers of that point's travel or
+velocity. Its columns are those of any other wrench along the motion, so it is a hypothesis as any other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rig_identification.estimate.solve import Problem
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.lawful import made_sparse
+from rig_identification.mismatch.point_laws import law_finding, parts_of, point_laws
+from rig_identification.mismatch.screen import Promise, extended
+from rig_identification.mismatch.trial import Trial, mass_of
+from rig_identification.search.ladder import Rung
+
+
+def promised_laws(rung: Rung, found: tuple[Candidate, ...]) -> list[Promise]:
+    """What laws promise about the motion of a model, best first; none where it has a law already."""
+    if any(parts_of(c) for c in found):
+        return []
+    return point_laws(rung.problem, rung.evaluation, mass_of(rung.problem, rung.evaluation))
+
+
+def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
+    """The effects ``found`` with no part in a law that is not seen. problem: without any effect."""
+    law = next((t for t in found if parts_of(t.candidate)), None)
+    if law is None:
+        return found
+    others = tuple(t.candidate for t in found if t is not law)
+    less = made_sparse(extended(problem, others), law, budget)
+    return [
+        replace(less if t is law else t, problem=less.problem, evaluation=less.evaluation) for t in found
+    ]
+
+
+def in_words(best: Explained, found: list[Trial]) -> Explained:
+    """What was found with each law told in words: where it acts, how strong, and what it follows."""
+    law = next((t.candidate for t in found if parts_of(t.candidate)), None)
+    if law is None:
+        return best
+    amount = parts_of(law)[0].name.removeprefix("unknown.")
+    findings = tuple(
+        law_finding(best.fitted, law, f) if f.effect == law.effect and amount in f.parameters else f
+        for f in best.mismatch.findings
+    )
+    return replace(best, mismatch=replace(best.mismatch, findings=findings))
