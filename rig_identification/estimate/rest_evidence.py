@@ -118,6 +118,7 @@ class RestLinearised:
     log_spread: float
     rest: Rest
     predicted: tuple[Array, ...]  # one (w,) a channel
+    felt: Array  # (m, 6) whitened response to a constant wrench, of a model with a discrepancy; else no row
 
     @property
     def cost(self) -> float:
@@ -164,10 +165,12 @@ def linearise_rest(
     if not residuals:
         return None
     residual, jacobian = np.concatenate(residuals), np.concatenate(jacobians)
+    felt = np.zeros((0, 6))
     if discrepancy is not None:
         felt = np.concatenate(in_raw) @ wrench_response(model, rest)
         factor = np.linalg.cholesky(np.eye(residual.size) + felt @ discrepancy.covariance @ felt.T)
         residual = np.asarray(np.linalg.solve(factor, residual), dtype=np.float64)
         jacobian = np.asarray(np.linalg.solve(factor, jacobian), dtype=np.float64)
+        felt = np.asarray(np.linalg.solve(factor, felt), dtype=np.float64)
         log_spread += float(np.sum(np.log(np.diag(factor))))
-    return RestLinearised(residual, jacobian, log_spread, rest, tuple(predictions))
+    return RestLinearised(residual, jacobian, log_spread, rest, tuple(predictions), felt)

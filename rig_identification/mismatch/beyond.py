@@ -63,6 +63,10 @@ class Beyond:
         own = self._scale * self.full.gradient[self.base]
         return Columns(seen, solved, gradient - solved.T @ own)
 
+    def bent_by(self, columns: Columns) -> Array:
+        """(b, c) by how much the base's unknowns give way to each of ``columns``, in their own units."""
+        return np.asarray(-self._scale[:, None] * columns.solved)
+
     def within(self, own: NDArray[np.int64]) -> Array:
         """(c, c) information left of the problem's unknowns ``own`` (c,), none of them in the base."""
         seen = self._scale[:, None] * self.full.information[np.ix_(self.base, own)]
