@@ -33,6 +33,7 @@ from rig_identification.mismatch.screen import Promise, free_without
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Motion, RigModel
+from rig_identification.quantity import with_interval
 from rig_identification.result import Finding
 from rig_identification.rig import Rig
 
@@ -340,7 +341,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     told = {first: told.pop(first)} | told
     told |= written({"force": (rms, share * rms, "N"), "peak_force": (peak, share * peak, "N")})
     grows = " and ".join(
-        f"{WORDS[name]} ({told[name]['value']:.4g} ± {told[name]['std']:.2g} {told[name]['unit']})"
+        f"{WORDS[name]} ({with_interval(told[name]['value'], told[name]['std'], told[name]['unit'])})"
         for name in parts
     )
     acts = f"along {axis}" if parts[0] in dict(SPRINGS) else "against its motion"
