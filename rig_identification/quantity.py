@@ -81,7 +81,16 @@ def with_interval(value: float, std: float, unit: str = "1") -> str:
         told = significant(value, 4)
     else:
         told = f"({number_text} ± {half}){power}" if power else f"{number_text} ± {half}"
-    return f"{told} {unit_text(unit)}".strip().replace("\u202f", "").replace("−", "-")
+    return _pasteable(f"{told} {unit_text(unit)}".strip())
+
+
+def plain_figure(value: float, digits: int = 3) -> str:
+    """A number of stated significant digits for a sentence: 38200, not 3.82e+04."""
+    return _pasteable(significant(value, digits))
+
+
+def _pasteable(text: str) -> str:
+    return text.replace("\u202f", "").replace("−", "-")
 
 
 def unit_text(unit: str) -> str:

@@ -20,7 +20,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, linearise_run
 from rig_identification.estimate.whiteness import Band, bands
 from rig_identification.model.definite import definite, integrated_out
-from rig_identification.quantity import with_interval
+from rig_identification.quantity import plain_figure, with_interval
 from rig_identification.result import Mismatch, ParameterEstimate
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ def _restless(fitted: Fitted, tried: int) -> list[str]:
 
 
 def _farthest(residual: Array) -> str:
-    return f"{float(np.max(np.abs(residual))):.3g} of their standard deviations off"
+    return f"{plain_figure(float(np.max(np.abs(residual))))} of their standard deviations off"
 
 
 def as_sentence(reasons: list[str]) -> str:
@@ -228,12 +228,12 @@ def judge(
             reasons.append(
                 f"the residual of {where} in {worst.recording} is not noise: "
                 f"between {worst.band.low:.2g} and {worst.band.high:.2g} Hz "
-                f"it has {worst.band.power:.3g} times the power of white noise"
+                f"it has {plain_figure(worst.band.power)} times the power of white noise"
             )
     for d in heard.contradicting():
         reasons.append(
             f"{d.recording}, held out, asks for other parameters than the fitted ones: squared deviations "
-            f"come to {d.statistic:.3g} where {d.directions} are to be expected"
+            f"come to {plain_figure(d.statistic)} where {d.directions} are to be expected"
         )
     reasons += [
         f"{run.recording.name}, held out, cannot be followed with these parameters from any start"

@@ -13,6 +13,7 @@ from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.locate import DRIVE, Event
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.model.motion import State
+from rig_identification.quantity import plain_figure
 from rig_identification.result import Finding
 
 Array = NDArray[np.float64]
@@ -88,8 +89,8 @@ def unknown_finding(
         text = f"Everything but {device} agrees: it is wrong in a way that no entry of the catalogue has."
     else:
         text = (
-            f"Something acts on the body that no entry of the catalogue has: about {np.max(strength):.3g} N "
-            f"(root mean square), mostly along {axis}, and {np.max(moment):.3g} N m; strongest at "
+            f"Something acts on the body that no entry of the catalogue has: about {plain_figure(float(np.max(strength)))} N "
+            f"(root mean square), mostly along {axis}, and {plain_figure(float(np.max(moment)))} N m; strongest at "
             f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
         )
         text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."

@@ -84,7 +84,8 @@ def _found(identification: Identification) -> Iterator[Step]:
     for finding in sorted(own, key=lambda f: -(f.evidence.get("log_likelihood_gain") or 0.0)):
         experiment = experiment_for(_kind(finding))
         if experiment:
-            what = f"Confirm {_called(finding)}: {experiment}."
+            verb = "Confirm" if finding.effect != "unknown" or finding.where.get("law") else "Find"
+            what = f"{verb} {_called(finding)}: {experiment}."
             yield Step(what, finding.statement, in_sigma(finding.evidence.get("log_likelihood_gain")))
 
 
@@ -121,13 +122,17 @@ def _held_out(session: Session) -> Iterator[Step]:
 
 def _measure_again(identification: Identification) -> Iterator[Step]:
     doubts = [(g.device, d) for g in doubt_groups(identification.parameters) for d in g.doubts if d.notable]
-    for device, doubt in sorted(doubts, key=lambda pair: -abs(pair[1].shift or 0.0)):
-        yield Step(
-            f"Measure again: {device} {doubt.name}.",
-            f"Described as {doubt.nominal} {doubt.unit}, estimated as {doubt.value} ± {doubt.half_width} "
-            f"{doubt.unit}.",
-            f"{significant(abs(doubt.shift or 0.0), 2)} tolerances",
-        )
+    if not doubts:
+        return
+    ranked = sorted(doubts, key=lambda pair: -abs(pair[1].shift or 0.0))
+    names = ", ".join(f"{device} {doubt.name}" for device, doubt in ranked[:MOST])
+    device, first = ranked[0]
+    yield Step(
+        f"Measure again: {names}{' and others' if len(ranked) > MOST else ''}.",
+        f"{device} {first.name} is described as {first.nominal} {first.unit} and estimated as {first.value} "
+        f"± {first.half_width} {first.unit}.",
+        f"up to {significant(abs(first.shift or 0.0), 2)} tolerances off",
+    )
 
 
 def _rivals(identification: Identification) -> Iterator[Step]:
