@@ -96,6 +96,7 @@ def hand_finding(fitted: Fitted) -> Finding | None:
         {"channel": None, "axis": None, "times": times},
         written({"peak_force": (peak, level, "N")}),
         {"log_likelihood_gain": None, "holdout_error_before": None, "holdout_error_after": None},
-        f"A person's hand or another outside force drives the body ({told}), with up to {plain_figure(peak, 2)} N. "
+        f"A person's hand or another outside force drives the body ({told}), "
+        f"with up to {plain_figure(peak, 2)} N. "
         "These parts were left out; let go before the recording that counts.",
     )

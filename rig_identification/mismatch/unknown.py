@@ -88,9 +88,10 @@ def unknown_finding(
     if device is not None:
         text = f"Everything but {device} agrees: it is wrong in a way that no entry of the catalogue has."
     else:
+        force, turning_moment = (plain_figure(float(np.max(v))) for v in (strength, moment))
         text = (
-            f"Something acts on the body that no entry of the catalogue has: about {plain_figure(float(np.max(strength)))} N "
-            f"(root mean square), mostly along {axis}, and {plain_figure(float(np.max(moment)))} N m; strongest at "
+            f"Something acts on the body that no entry of the catalogue has: about {force} N "
+            f"(root mean square), mostly along {axis}, and {turning_moment} N m; strongest at "
             f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
         )
         text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."
