@@ -157,7 +157,7 @@ def test_what_to_do_next_is_in_order(
     )
     steps = [step.what for step in next_steps(found, session)]
     assert steps[0] == "Swap the plugs."
-    assert next_steps(found, session)[0].evidence == "10 σ"
+    assert next_steps(found, session)[0].evidence == "evidence 10 σ"
     assert "Confirm cable elasticity" in steps[1]
     assert "Jzz" in steps[2]
     assert any(step.startswith("Measure again: IMU accelerometer bias x") for step in steps)

@@ -29,7 +29,7 @@ class Step:
 
     what: str
     why: str
-    evidence: str  # "12 σ": how surely it is needed; "" where that has no number
+    evidence: str  # "evidence 12 σ": how surely it is needed; "" where that has no number
 
 
 def next_steps(identification: Identification, session: Session) -> list[Step]:
@@ -58,6 +58,10 @@ def in_sigma(nats: float | None) -> str:
     return f"{significant(sigma, 2)} σ" if sigma < BEYOND_DOUBT else f"over {BEYOND_DOUBT:.0f} σ"
 
 
+def _evidence(nats: float | None) -> str:
+    return f"evidence {told}" if (told := in_sigma(nats)) else ""
+
+
 def _set_up(identification: Identification) -> Iterator[Step]:
     examination = identification.examination
     faults = () if examination is None else examination.faults
@@ -65,7 +69,7 @@ def _set_up(identification: Identification) -> Iterator[Step]:
         done = (
             "This answer is corrected for it." if fault.corrected else "This answer is not corrected for it."
         )
-        yield Step(fault.advice or fault.statement, f"{fault.statement} {done}", in_sigma(fault.gain))
+        yield Step(fault.advice or fault.statement, f"{fault.statement} {done}", _evidence(fault.gain))
 
 
 def _converged(identification: Identification) -> Iterator[Step]:
@@ -86,7 +90,7 @@ def _found(identification: Identification) -> Iterator[Step]:
         if experiment:
             verb = "Confirm" if finding.effect != "unknown" or finding.where.get("law") else "Find"
             what = f"{verb} {_called(finding)}: {experiment}."
-            yield Step(what, finding.statement, in_sigma(finding.evidence.get("log_likelihood_gain")))
+            yield Step(what, finding.statement, _evidence(finding.evidence.get("log_likelihood_gain")))
 
 
 def _kind(finding: Finding) -> str:
