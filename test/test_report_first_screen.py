@@ -166,6 +166,26 @@ def test_what_to_do_next_is_in_order(
     assert "The numbers can be used." in Page(render_report(clean, session)).text
 
 
+def test_only_an_open_question_is_worth_an_experiment(
+    identification: Identification, session: Session
+) -> None:
+    near = {"effect": "cable_mass", "where": {}, "log_likelihood_gap": 2.0, "experiment": "weigh a length"}
+    far = {**near, "effect": "tether", "log_likelihood_gap": 50.0}
+    mismatch = replace(identification.mismatch, alternatives=(near, far))
+    (step,) = next_steps(replace(identification, mismatch=mismatch, parameters=()), session)
+    assert step.what == "To decide on cable mass: weigh a length."
+    assert step.evidence == "2.0 σ apart so far"
+
+
+def test_one_experiment_for_two_findings_is_one_step(explained: Identification, session: Session) -> None:
+    damping = replace(make_finding(), effect="hinge_damping", where={}, statement="Hinges damp.")
+    drag = replace(damping, effect="air_drag", statement="The air resists.")
+    mismatch = replace(explained.mismatch, findings=(damping, drag), alternatives=())
+    first = next_steps(replace(explained, mismatch=mismatch, converged=True), session)[0]
+    assert first.what.startswith("Confirm hinge damping, air drag: let it swing down")
+    assert first.why == "Hinges damp. The air resists."
+
+
 def test_a_session_has_a_date_and_a_digest_of_its_samples(session: Session) -> None:
     assert recorded_on(session) == "2023-11-14 22:13 UTC"
     assert re.fullmatch("[0-9a-f]{12}", digest(session))

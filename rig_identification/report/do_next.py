@@ -17,8 +17,8 @@ from rig_identification.result import Finding, Identification
 
 #: Steps that are shown; what follows is of less use than what stands before it.
 MOST = 6
-#: Nats by which an explanation trails and may still be the right one, as the page says below their table.
-TIE = 3.0
+#: Nats by which an explanation trails beyond which it needs no experiment: three standard deviations.
+DECIDED = 4.5
 #: σ from which on a larger figure says no more.
 BEYOND_DOUBT = 30.0
 
@@ -85,12 +85,16 @@ def _found(identification: Identification) -> Iterator[Step]:
 
     examination = identification.examination
     own = identification.mismatch.findings[0 if examination is None else len(examination.faults) :]
+    together: dict[tuple[str, str], list[Finding]] = {}
     for finding in sorted(own, key=lambda f: -(f.evidence.get("log_likelihood_gain") or 0.0)):
-        experiment = experiment_for(_kind(finding))
-        if experiment:
-            verb = "Confirm" if finding.effect != "unknown" or finding.where.get("law") else "Find"
-            what = f"{verb} {_called(finding)}: {experiment}."
-            yield Step(what, finding.statement, _evidence(finding.evidence.get("log_likelihood_gain")))
+        verb = "Confirm" if finding.effect != "unknown" or finding.where.get("law") else "Find"
+        if experiment := experiment_for(_kind(finding)):
+            together.setdefault((verb, experiment), []).append(finding)
+    for (verb, experiment), findings in together.items():
+        names = ", ".join(dict.fromkeys(_called(finding) for finding in findings))
+        told = " ".join(finding.statement for finding in findings)
+        strongest = findings[0].evidence.get("log_likelihood_gain")
+        yield Step(f"{verb} {names}: {experiment}.", told, _evidence(strongest))
 
 
 def _kind(finding: Finding) -> str:
@@ -140,17 +144,16 @@ def _measure_again(identification: Identification) -> Iterator[Step]:
 
 
 def _rivals(identification: Identification) -> Iterator[Step]:
+    """What would decide between explanations that these recordings leave open."""
     entries = identification.mismatch.alternatives
     for view, entry in zip(alternative_views(identification.mismatch), entries, strict=True):
         gap = entry.get("log_likelihood_gap")
-        if not view.experiment or not isinstance(gap, (int, float)):
+        if not view.experiment or not isinstance(gap, (int, float)) or not gap < DECIDED:
             continue
         called = (str(entry.get("effect")) != "unknown" and view.effect) or view.where or view.effect
-        why = (
-            f"These recordings neither show nor exclude it ({view.amount})."
-            if gap < TIE
-            else "It is less likely."
-        )
+        told = f" ({view.amount})" if view.amount else ""
         yield Step(
-            f"To decide on {called}: {view.experiment}.", why, f"{in_sigma(gap) or '0 σ'} apart so far"
+            f"To decide on {called}: {view.experiment}.",
+            f"These recordings neither show nor exclude it{told}.",
+            f"{in_sigma(gap) or '0 σ'} apart so far",
         )
