@@ -78,6 +78,7 @@ setup(
             "pytest-xdist>=3.6",
             "ruff>=0.17,<0.18",
         ],
+        "docs": ["mkdocs-material>=9.5"],
         "dev": ["exudyn>=1.8", "mujoco>=3.1", "mypy>=1.10"],
     },
     entry_points={"console_scripts": ["rig-identification = rig_identification.cli.main:main", *NODES]},

@@ -29,7 +29,8 @@ from rig_identification.examination import Examination, RestReading, SetupFault,
 from rig_identification.raw import RawSession
 from rig_identification.recording import Session
 from rig_identification.report import examination_to_dict, render_check
-from rig_identification.report.rig_drawing import described_scene, rig_svgs
+from rig_identification.report.rig_drawing import rig_svgs
+from rig_identification.report.rig_scene import described_scene
 from rig_identification.report.setup import faulty_parts, headline, rest_views, topic_views
 from rig_identification.rig import Rig
 from rig_identification.session import read_raw, write_session
@@ -180,10 +181,10 @@ def test_parts_at_fault_are_found_wherever_the_fault_names_them() -> None:
     """Two swapped cells name the second one in a list or among the parameters."""
     swapped = make_fault(where={"channel": "cable_1", "channels": ["cable_1", "cable_3"]}, parameters={})
     mount = make_fault(where={"channel": "imu"}, parameters={"like": {"value": "exciter", "std": 0.0}})
-    assert faulty_parts(make_examination(faults=(swapped, mount)), make_rig()) == {
+    assert faulty_parts((swapped, mount), make_rig()) == {
         "cable_1", "cable_3", "imu", "exciter",
     }  # fmt: skip
-    assert faulty_parts(make_examination(), make_rig()) == {"cable_2"}
+    assert faulty_parts(make_examination().faults, make_rig()) == {"cable_2"}
 
 
 @pytest.mark.parametrize(
@@ -197,7 +198,7 @@ def test_parts_at_fault_are_found_wherever_the_fault_names_them() -> None:
 )
 def test_one_channel_may_stand_for_several_devices(channel: str, parts: set[str]) -> None:
     fault = make_fault(where={"channel": channel}, parameters={})
-    assert faulty_parts(make_examination(faults=(fault,)), make_rig()) == parts
+    assert faulty_parts((fault,), make_rig()) == parts
 
 
 def test_what_is_at_fault_is_red_in_every_view() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,13 @@ NO_BODY = ["1", "0", "0", "0", "1", "0", "0", "1", "0", "9"]
 BAR = ["12", "0.4", "0", "-0.05", "0.09", "0", "0", "1.1", "0", "1.15"]
 
 
+def _farthest(result: dict[str, Any], truth: dict[str, Any]) -> float:
+    """Largest error of the ten numbers, in standard deviations."""
+    keys = ("mass", "center_of_mass", "inertia")
+    off = [np.abs(np.subtract(result[k]["value"], truth[k])) / result[k]["std"] for k in keys]
+    return float(max(np.max(part) for part in off))
+
+
 def simulate(out: Path, *arguments: str) -> int:
     return main(["simulate", "--out", str(out), "--duration", "2", "--rest", "1", *arguments])
 
@@ -26,7 +35,7 @@ def test_demo_makes_a_session_identifies_it_and_names_the_report(
 ) -> None:
     out = tmp_path / "demo"
     assert main(["demo", "--out", str(out), "--duration", "10"]) == 0
-    last = capsys.readouterr().out.strip().splitlines()[-1]
+    beside, last = capsys.readouterr().out.strip().splitlines()[-2:]
     assert last == f"report: {out / 'report.html'}"
     assert "<html" in (out / "report.html").read_text(encoding="utf-8")[:500]
     result = json.loads((out / "result.json").read_text())
@@ -34,6 +43,9 @@ def test_demo_makes_a_session_identifies_it_and_names_the_report(
     assert abs(result["mass"]["value"] - truth["mass"]) < 4.0 * result["mass"]["std"]
     off = np.subtract(result["inertia"]["value"], truth["inertia"]) / result["inertia"]["std"]
     assert np.max(np.abs(off)) < 4.0
+    told = re.search(r"truth: 10 numbers within ([\d.]+) σ", beside)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(_farthest(result, truth), abs=0.051)
     session = read_session(out / "session")
     assert [r.holdout for r in session.recordings] == [False, False, False, True]
 

@@ -15,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from rig_identification.quantity import significant, unit_text, value_and_half_width
 from rig_identification.recording import Session
 from rig_identification.report import render_report, result_to_dict, write_report, write_result
 from rig_identification.report.doubts import doubt_groups
 from rig_identification.report.envelope import envelope, worst_stretch
 from rig_identification.report.line_chart import Curve, Panel, chart_svg, path_data, ticks
 from rig_identification.report.principal import inertia_matrix, principal_inertia
-from rig_identification.report.quantity import significant, unit_text, value_and_half_width
 from rig_identification.report.residuals import summarise_residual
 from rig_identification.report.rest_pose import rest_pose
 from rig_identification.report.ten_numbers import blocks
@@ -344,17 +344,20 @@ def test_the_page_stands_alone(
     assert "url(" not in source
 
 
-def test_the_page_begins_with_the_ten_numbers(page: Page) -> None:
+def test_the_page_begins_with_rig_numbers_lights_and_what_to_do(page: Page) -> None:
     order = [
+        "rig",
         "numbers",
+        "lights",
+        "next",
         "verdict",
         "channels",
         "residuals",
         "findings",
         "determined",
         "doubts",
+        "views",
         "quality",
-        "rig",
         "notes",
     ]
     assert [i for i in page.ids if i in order] == order
@@ -394,7 +397,7 @@ def test_findings_are_on_the_page(
     ):
         assert part in told
     assert "ceiling compliance" in told
-    assert "fit not converged" in told
+    assert "The fit did not settle" in told
     assert "nothing was held out" in told
     assert "What it did to the ten numbers" in told
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rig_identification.cli.checked import setup_lines
 from rig_identification.cli.plain_numbers import plain_number
-from rig_identification.report.quantity import NOT_DETERMINED
+from rig_identification.quantity import NOT_DETERMINED
 from rig_identification.report.ten_numbers import elements
 from rig_identification.result import Identification, InertialEstimate
 

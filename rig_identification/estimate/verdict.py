@@ -20,6 +20,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised, linearise_run
 from rig_identification.estimate.whiteness import Band, bands
 from rig_identification.model.definite import definite, integrated_out
+from rig_identification.quantity import plain_figure, with_interval
 from rig_identification.result import Mismatch, ParameterEstimate
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ DOUBTED = 8.0
 LET_GO = 100.0
 
 
-def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
-    """Doubts that the recordings significantly want beyond what is ordinary.
+def _pressed(fitted: Fitted, ordinary: float) -> dict[str, float]:
+    """Doubts that the recordings significantly want beyond what is ordinary, and how far (tolerances).
 
     A doubt is let go by taking its belief away: what the recordings alone make of it, and what that gains. An
     error of many tolerances hardly moves a doubt that is believed to one, and shows in nothing else. Where
@@ -91,7 +92,7 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
     limit = 0.5 * float(chi2.isf(DOUBTED * FALSE_ALARM / max(HYPOTHESES, len(parameters.free)), 1))
     doubts = [i for i, p in enumerate(parameters.free, start=INERTIAL) if p.bounded and not p.ratio]
     held = {i for i in doubts if abs(theta[i]) >= ordinary * (1.0 - 1e-6) and theta[i] * gradient[i] > 0.0}
-    out = set()
+    out = {}
     for i in doubts:
         free = np.array([k for k in range(gradient.size) if k == i or k not in held])
         at = int(np.flatnonzero(free == i)[0])
@@ -100,8 +101,9 @@ def _pressed(fitted: Fitted, ordinary: float) -> set[str]:
         pull[at] += theta[i] * (1.0 - LET_GO**-2)
         step = np.linalg.solve(definite(inside), pull)
         gain = 0.5 * float(step @ pull)
-        if gain > limit and abs(theta[i] + step[at]) > ordinary:
-            out.add(parameters.free[i - INERTIAL].name)
+        wanted = float(theta[i] + step[at])
+        if gain > limit and abs(wanted) > ordinary:
+            out[parameters.free[i - INERTIAL].name] = wanted
     return out
 
 
@@ -182,7 +184,7 @@ def weighed_otherwise(fitted: Fitted) -> str | None:
     mass = float(fitted.problem.bench.parameters.elements(fitted.evaluation.point.theta)[0])
     if chi2.sf(((mass - value) / std) ** 2, 1) > 0.5 * FALSE_ALARM:
         return None
-    return f"the rig carries {mass:.6g} kg, the scale says {value:.6g} ± {std:.2g} kg"
+    return f"the rig carries {mass:.6g} kg, the scale says {with_interval(value, std, 'kg')}"
 
 
 def _restless(fitted: Fitted, tried: int) -> list[str]:
@@ -196,7 +198,13 @@ def _restless(fitted: Fitted, tried: int) -> list[str]:
 
 
 def _farthest(residual: Array) -> str:
-    return f"{float(np.max(np.abs(residual))):.3g} of their standard deviations off"
+    return f"{plain_figure(float(np.max(np.abs(residual))))} of their standard deviations off"
+
+
+def as_sentence(reasons: list[str]) -> str:
+    """Reasons as one sentence; units and names keep their capitals."""
+    told = "; ".join(reasons)
+    return f"{told[:1].upper()}{told[1:]}."
 
 
 def judge(
@@ -211,7 +219,7 @@ def judge(
     witnesses = heard.witnesses
     pressed = _pressed(fitted, ordinary)
     heavy = weighed_otherwise(fitted)
-    beyond = [p for p in parameters if p.name in pressed]
+    beyond = [(p.name, pressed[p.name]) for p in parameters if p.name in pressed]
     reasons = []
     if witnesses:
         worst = min(witnesses, key=lambda w: w.band.log10_p)
@@ -220,12 +228,12 @@ def judge(
             reasons.append(
                 f"the residual of {where} in {worst.recording} is not noise: "
                 f"between {worst.band.low:.2g} and {worst.band.high:.2g} Hz "
-                f"it has {worst.band.power:.3g} times the power of white noise"
+                f"it has {plain_figure(worst.band.power)} times the power of white noise"
             )
     for d in heard.contradicting():
         reasons.append(
             f"{d.recording}, held out, asks for other parameters than the fitted ones: squared deviations "
-            f"come to {d.statistic:.3g} where {d.directions} are to be expected"
+            f"come to {plain_figure(d.statistic)} where {d.directions} are to be expected"
         )
     reasons += [
         f"{run.recording.name}, held out, cannot be followed with these parameters from any start"
@@ -241,8 +249,12 @@ def judge(
     if heavy is not None:
         reasons.append(heavy)
     if beyond:
-        names = ", ".join(p.name for p in beyond[:3]) + (" and others" if len(beyond) > 3 else "")
-        reasons.append(f"{names} would have to lie more than {ordinary:.0f} tolerances from the description")
+        wanted = ", ".join(f"{name} {off:+.1f}" for name, off in beyond[:3])
+        reasons.append(
+            f"without its tolerance a number of the rig description would leave it by more than "
+            f"{ordinary:.0f} tolerances: {wanted}{' and others' if len(beyond) > 3 else ''} "
+            "(with the tolerance the fit holds it nearer)"
+        )
     scores = (
         f"Held-out error {holdout_error:.3g}, fitted {training_error:.3g} (1 is a perfect model)."
         if (holdout_error is not None)
@@ -250,5 +262,5 @@ def judge(
     )
     judged = "Judged by the residuals alone."
     if reasons:
-        return Mismatch("unexplained", f"{'; '.join(reasons).capitalize()}. {scores} {judged}")
+        return Mismatch("unexplained", f"{as_sentence(reasons)} {scores} {judged}")
     return Mismatch("none", f"Every residual is noise within its sensor's own. {scores} {judged}")

@@ -14,6 +14,7 @@ from rig_identification.mismatch.candidate import Told
 from rig_identification.mismatch.experiments import experiment_for
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial
+from rig_identification.quantity import plain_figure, with_interval
 from rig_identification.result import Finding, Mismatch
 
 Array = NDArray[np.float64]
@@ -45,10 +46,7 @@ def finding(
     """
     candidate = trial.candidate
     told = candidate.told(found)
-    shown = {
-        name: f"{value:.4g} ± {std:.2g}" + ("" if unit == "1" else f" {unit}")
-        for name, (value, std, unit) in told.items()
-    }
+    shown = {name: with_interval(value, std, unit) for name, (value, std, unit) in told.items()}
     where = dict(candidate.where)
     for place in (f"{candidate.effect}.point", f"{candidate.effect}.position"):
         if f"{place}.x" in found.values:
@@ -140,7 +138,7 @@ def pushed(
     size = float(np.linalg.norm(force))
     text = (
         f"Something pushes the body from {start:.2f} to {end:.2f} s of {recording}, with up to "
-        f"{size:.3g} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. "
+        f"{plain_figure(size)} N, mostly along {AXES[axis]}: a hand, a gust, a hose that catches. "
         f"{beside}These seconds are left out of the fit. Keep people and draughts away from the rig, or cut "
         "the recording there."
     )

@@ -11,6 +11,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.mismatch.findings import written
+from rig_identification.quantity import plain_figure
 from rig_identification.recording import Recording
 from rig_identification.result import Finding
 
@@ -95,6 +96,7 @@ def hand_finding(fitted: Fitted) -> Finding | None:
         {"channel": None, "axis": None, "times": times},
         written({"peak_force": (peak, level, "N")}),
         {"log_likelihood_gain": None, "holdout_error_before": None, "holdout_error_after": None},
-        f"A person's hand or another outside force drives the body ({told}), with up to {peak:.2g} N. "
+        f"A person's hand or another outside force drives the body ({told}), "
+        f"with up to {plain_figure(peak, 2)} N. "
         "These parts were left out; let go before the recording that counts.",
     )

@@ -33,6 +33,7 @@ from rig_identification.mismatch.screen import Promise, free_without
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Motion, RigModel
+from rig_identification.quantity import plain_figure, with_interval
 from rig_identification.result import Finding
 from rig_identification.rig import Rig
 
@@ -340,7 +341,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     told = {first: told.pop(first)} | told
     told |= written({"force": (rms, share * rms, "N"), "peak_force": (peak, share * peak, "N")})
     grows = " and ".join(
-        f"{WORDS[name]} ({told[name]['value']:.4g} ± {told[name]['std']:.2g} {told[name]['unit']})"
+        f"{WORDS[name]} ({with_interval(told[name]['value'], told[name]['std'], told[name]['unit'])})"
         for name in parts
     )
     acts = f"along {axis}" if parts[0] in dict(SPRINGS) else "against its motion"
@@ -351,7 +352,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     place_told = ", ".join(f"{p:.2f}" if k else "any" for p, k in zip(at, known, strict=True))
     text = (
         f"A force {acts} at ({place_told}) m of the body grows {grows}{fades}: "
-        f"{rms:.3g} N (root mean square), up to {peak:.3g} N. {candidate.advice}"
+        f"{plain_figure(rms)} N (root mean square), up to {plain_figure(peak)} N. {candidate.advice}"
     )
     where = {**plain.where, "axis": axis, "position": [float(v) for v in at]}
     return replace(plain, where=where, parameters=told, statement=text)

@@ -19,6 +19,7 @@ from rig_identification.mismatch.rider_places import spread_of
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.screen import screen, with_reference
 from rig_identification.mismatch.trial import mass_of
+from rig_identification.quantity import with_interval
 from rig_identification.result import Finding
 
 Array = NDArray[np.float64]
@@ -83,7 +84,7 @@ def _told_by_blows(knocks: Knocks, middle: Array, before: float | None) -> Findi
     across = " and ".join(f"{a} = {v:.2f} m" for a, v in zip(AXES, line.at, strict=True) if a != line.axis)
     text = (
         f"Something slides along {line.axis} and knocks at {stops}: {knocks.blows} blows of one line of "
-        f"action, through {across}, by a part of about {knocks.mass:.2g} kg (± {knocks.std:.2g} kg). Each "
+        f"action, through {across}, by a part of {with_interval(knocks.mass, knocks.std, 'kg')}. Each "
         "comes when and as hard as a part would that the one before left at a stop "
         f"({knocks.timed:.0f} nats, of which {knocks.confirmed:.0f} from blows that nothing was fitted to). "
         "The blows themselves are not followed to the noise. Find it by ear, and fix it or take it out."
@@ -103,10 +104,10 @@ def _told(part: Loose, between: bool, gain: Gain, again: Gain, before: float | N
     if between:
         quantities["travel"] = part.travel, TIMED * part.travel, "m"
         stops = f"its stops {1e3 * part.travel:.0f} mm to either side"
-    told = f"{gain.mass:.2g} kg of it or more (± {std:.2g} kg; blows timed a little off make it look lighter)"
+    told = f"{with_interval(gain.mass, std, 'kg')} of it or more (blows timed a little off look lighter)"
     text = (
         f"Something slides along {part.axis} and hits {stops}: "
-        f"about {told}. Nothing else of the catalogue takes as much of the missing wrench away, and where "
+        f"{told}. Nothing else of the catalogue takes as much of the missing wrench away, and where "
         f"nothing was fitted it does so too ({gain.nats:.0f} and {again.nats:.0f} nats). The blows "
         "themselves are not followed to the noise. Find it by ear, and fix it or take it out."
     )

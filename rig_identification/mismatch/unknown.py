@@ -13,6 +13,7 @@ from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.locate import DRIVE, Event
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.model.motion import State
+from rig_identification.quantity import plain_figure
 from rig_identification.result import Finding
 
 Array = NDArray[np.float64]
@@ -87,9 +88,10 @@ def unknown_finding(
     if device is not None:
         text = f"Everything but {device} agrees: it is wrong in a way that no entry of the catalogue has."
     else:
+        force, turning_moment = (plain_figure(float(np.max(v))) for v in (strength, moment))
         text = (
-            f"Something acts on the body that no entry of the catalogue has: about {np.max(strength):.3g} N "
-            f"(root mean square), mostly along {axis}, and {np.max(moment):.3g} N m; strongest at "
+            f"Something acts on the body that no entry of the catalogue has: about {force} N "
+            f"(root mean square), mostly along {axis}, and {turning_moment} N m; strongest at "
             f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
         )
         text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from rig_identification.nodes.rig_node import OK, WARN, diagnostic
+from rig_identification.quantity import with_interval
 from rig_identification.result import ELEMENTS
 
 _NAN = float("nan")
@@ -19,6 +20,14 @@ _NAN = float("nan")
 
 def _number(value: float | None) -> float:
     return _NAN if value is None else float(value)
+
+
+def _shown(parameter: dict[str, Any]) -> str:
+    """A finding's number with its 95 % interval, as the report has it; "–" where there is none."""
+    value, std = parameter["value"], parameter["std"]
+    if not isinstance(value, (int, float)):
+        return "–" if value is None else str(value)
+    return with_interval(value, 0.0 if std is None else std, parameter["unit"] or "1")
 
 
 def inertia_message(result: dict[str, Any], stamp: Time) -> InertiaStamped:
@@ -60,7 +69,7 @@ def mismatch_message(answer: dict[str, Any], stamp: Time) -> DiagnosticArray:
     level = WARN if verdict == "unexplained" else OK
     status = [diagnostic("mismatch", level, f"{verdict}: {answer['explanation']}")]
     for finding in mismatch["findings"]:
-        values = {name: f"{p['value']} ± {p['std']} {p['unit']}" for name, p in finding["parameters"].items()}
+        values = {name: _shown(p) for name, p in finding["parameters"].items()}
         values.update({key: str(value) for key, value in finding["where"].items()})
         status.append(diagnostic(f"mismatch: {finding['effect']}", WARN, finding["statement"], **values))
     message = DiagnosticArray(status=status)

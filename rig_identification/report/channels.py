@@ -8,9 +8,11 @@ from html import escape
 import numpy as np
 from markupsafe import Markup
 
+from rig_identification.quantity import decimals, number, significant, unit_text
 from rig_identification.report.envelope import envelope, worst_stretch
+from rig_identification.report.grades import grade
 from rig_identification.report.line_chart import Curve, Panel, chart_svg, padded_limits
-from rig_identification.report.quantity import significant, unit_text
+from rig_identification.report.words import device_words, words
 from rig_identification.result import ChannelFit
 
 #: Bytes that all charts of a page may take; a page then stays well under five megabytes.
@@ -26,8 +28,10 @@ class ChannelView:
     label: str
     anchor: str
     rms: float
+    grade: str  # of the residual: good, fair, bad
     noise: str  # "2.1 N, from the rig description"
-    full: Markup
+    readings: tuple[str, str, str] | None  # measured, predicted, unit: of a single sample, which is no curve
+    full: Markup | None
     close_up: Markup | None  # the stretch where the residual is largest
 
 
@@ -38,8 +42,19 @@ class RecordingView:
     name: str
     role: str  # "held out", "fitted", "at rest"
     rms: float
+    grade: str
     channels: tuple[ChannelView, ...]
     open: bool
+
+    @property
+    def charts(self) -> tuple[ChannelView, ...]:
+        """Channels that are drawn."""
+        return tuple(c for c in self.channels if c.full is not None)
+
+    @property
+    def single(self) -> tuple[ChannelView, ...]:
+        """Channels of one sample, which stand in a table."""
+        return tuple(c for c in self.channels if c.readings is not None)
 
 
 def finite_channels(channels: tuple[ChannelFit, ...]) -> tuple[tuple[ChannelFit, ...], tuple[str, ...]]:
@@ -64,14 +79,14 @@ def finite_channels(channels: tuple[ChannelFit, ...]) -> tuple[tuple[ChannelFit,
 
 def channel_label(fit: ChannelFit) -> str:
     """Name of a channel for a person: ``imu angular rate x``."""
-    words = [fit.channel, fit.quantity.replace("_", " "), fit.axis or ""]
-    return " ".join(w for w in words if w)
+    parts = [device_words(fit.channel), words(fit.quantity), fit.axis or ""]
+    return " ".join(part for part in parts if part)
 
 
 def channel_anchor(fit: ChannelFit) -> str:
     """Fragment of the page that shows a channel."""
-    words = [fit.recording, fit.channel, fit.quantity, fit.axis or ""]
-    return "-".join("".join(c if c.isalnum() or c == "_" else "_" for c in w) for w in words if w)
+    parts = [fit.recording, fit.channel, fit.quantity, fit.axis or ""]
+    return "-".join("".join(c if c.isalnum() or c == "_" else "_" for c in w) for w in parts if w)
 
 
 def recording_views(channels: tuple[ChannelFit, ...], roles: dict[str, str]) -> list[RecordingView]:
@@ -91,13 +106,17 @@ def recording_views(channels: tuple[ChannelFit, ...], roles: dict[str, str]) -> 
     for name in names:
         fits = [c for c in channels if c.recording == name]
         role = roles.get(name, "")
-        shown = tuple(_channel_view(c, columns, close_up=role != "at rest") for c in fits)
-        rms = float(np.sqrt(np.mean(np.concatenate([c.residual_in_sigma for c in fits]) ** 2)))
-        views.append(RecordingView(name, role, rms, shown, open=name == names[0]))
+        shown = tuple(_channel_view(c, columns, len(channels), close_up=role != "at rest") for c in fits)
+        residual = np.concatenate([c.residual_in_sigma for c in fits])
+        rms = float(np.sqrt(np.mean(residual**2)))
+        told = grade(rms, len(residual), len(names))
+        views.append(RecordingView(name, role, rms, told, shown, open=name == names[0]))
     return views
 
 
-def _channel_view(fit: ChannelFit, columns: int, *, close_up: bool) -> ChannelView:
+def _channel_view(fit: ChannelFit, columns: int, compared: int, *, close_up: bool) -> ChannelView:
+    """compared: channels of the whole page."""
+    drawn = len(fit.time) > 1
     start, end = float(fit.time[0]), float(fit.time[-1])
     width = float(np.clip((end - start) / 6.0, 2.0, 6.0))
     where = worst_stretch(fit.time, fit.residual_in_sigma, width)
@@ -107,10 +126,19 @@ def _channel_view(fit: ChannelFit, columns: int, *, close_up: bool) -> ChannelVi
         label=channel_label(fit),
         anchor=channel_anchor(fit),
         rms=fit.rms_in_sigma,
+        grade=grade(fit.rms_in_sigma, len(fit.time), compared),
         noise=f"{significant(fit.noise_std, 2)} {unit_text(fit.unit)}, {source}",
-        full=_chart(fit, (start, end), columns),
+        readings=None if drawn else _readings(fit),
+        full=_chart(fit, (start, end), columns) if drawn else None,
         close_up=_chart(fit, where, columns) if close_up else None,
     )
+
+
+def _readings(fit: ChannelFit) -> tuple[str, str, str]:
+    """Measured and predicted to the digits of the noise, and their unit."""
+    places = decimals(fit.noise_std)
+    measured, predicted = (number(float(v[0]), places) for v in (fit.measured, fit.predicted))
+    return measured, predicted, unit_text(fit.unit)
 
 
 def _chart(fit: ChannelFit, window: tuple[float, float], columns: int) -> Markup:

@@ -9,7 +9,8 @@ from markupsafe import Markup
 from rig_identification import __version__
 from rig_identification.examination import Examination
 from rig_identification.report.page import page_environment
-from rig_identification.report.rig_drawing import described_scene, rig_svgs
+from rig_identification.report.rig_drawing import rig_svgs
+from rig_identification.report.rig_scene import described_scene
 from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.rig import Rig
 
@@ -17,7 +18,7 @@ from rig_identification.rig import Rig
 def render_check(examination: Examination, rig: Rig) -> str:
     """HTML that loads nothing from anywhere."""
     environment, style = page_environment()
-    faulty = faulty_parts(examination, rig)
+    faulty = faulty_parts(examination.faults, rig)
     return environment.get_template("check.html.j2").render(
         style=style,
         version=__version__,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.quantity import Z_95, significant
 from rig_identification.recording import Recording, Session
-from rig_identification.report.quantity import Z_95, significant
 from rig_identification.report.ten_numbers import Element, elements
 from rig_identification.result import ELEMENTS, Identification
 
@@ -32,7 +32,7 @@ def determinations(identification: Identification, session: Session) -> list[Det
     given = identification.figures.get("unobservable_reasons")
     reasons = given if isinstance(given, Mapping) else {}
     total = identification.total
-    scales = _scales(total.values)
+    scales = _scales(total.values, total.unobservable)
     rows = []
     for i, (name, element) in enumerate(zip(ELEMENTS, elements(total), strict=True)):
         if element.observable:
@@ -44,9 +44,13 @@ def determinations(identification: Identification, session: Session) -> list[Det
     return rows
 
 
-def _scales(values: NDArray[np.float64]) -> list[float]:
-    """What an interval is compared with: the mass itself, the mean diagonal inertia; lengths stand alone."""
-    inertia = float(np.mean(values[[4, 7, 9]]))
+def _scales(values: NDArray[np.float64], unobservable: tuple[str, ...]) -> list[float]:
+    """What an interval is compared with: the mass itself, the mean diagonal inertia; lengths stand alone.
+
+    The mean is that of the diagonal elements that are determined: what stands for the others is no inertia.
+    """
+    known = [i for i in (4, 7, 9) if ELEMENTS[i] not in unobservable and np.isfinite(values[i])]
+    inertia = float(np.mean(values[known])) if known else 0.0
     return [float(values[0]), *[0.0] * 3, *[inertia] * 6]
 
 
@@ -55,7 +59,7 @@ def _relative(half: float, scale: float, name: str) -> str:
         return f"{significant(1e3 * half, 2)} mm"
     if not np.isfinite(scale) or scale <= 0.0:
         return ""
-    of = "of m" if name == "m" else "of the mean diagonal element"
+    of = "of m" if name == "m" else "of the mean of the determined diagonal elements"
     return f"{significant(100.0 * half / scale, 2)} % {of}"
 
 

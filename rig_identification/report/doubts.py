@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from rig_identification.report.quantity import Z_95, significant, unit_text, value_and_half_width
+from rig_identification.quantity import Z_95, amount, exponent, significant, unit_text
+from rig_identification.report.words import device_words, parameter_words
 from rig_identification.result import ParameterEstimate
 
 SPAN = 4.0  # tolerances either side of the description that a bar shows
@@ -47,7 +48,7 @@ def doubt_groups(parameters: tuple[ParameterEstimate, ...]) -> list[Group]:
         devices.setdefault(device if rest else "rig", []).append(_doubt(parameter, rest or parameter.name))
     return [
         Group(
-            device=device,
+            device=device_words(device),
             doubts=tuple(doubts),
             furthest=max((abs(d.shift) for d in doubts if d.shift is not None), default=0.0),
             notable=any(d.notable for d in doubts),
@@ -57,14 +58,14 @@ def doubt_groups(parameters: tuple[ParameterEstimate, ...]) -> list[Group]:
 
 
 def _doubt(parameter: ParameterEstimate, name: str) -> Doubt:
-    value, half = value_and_half_width(parameter.value, parameter.std)
+    value, half, power = amount(parameter.value, parameter.std)
     stated = np.isfinite(parameter.prior_std) and parameter.prior_std > 0.0
     shift = (parameter.value - parameter.nominal) / parameter.prior_std if stated else None
     ratio = parameter.std / parameter.prior_std if stated else None
     return Doubt(
-        name=name.replace("_", " ").replace(".", " "),
-        unit=unit_text(parameter.unit),
-        nominal=significant(parameter.nominal, 5),
+        name=parameter_words(name),
+        unit=f"{power} {unit_text(parameter.unit)}".strip(),
+        nominal=significant(parameter.nominal / 10.0 ** exponent(parameter.value, parameter.std), 5),
         value=value,
         half_width=half,
         shift=shift,

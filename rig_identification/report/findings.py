@@ -6,15 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rig_identification.report.quantity import (
-    number,
-    power_of_ten,
-    significant,
-    unit_text,
-    value_and_half_width,
-)
+from rig_identification.quantity import amount, number, significant, unit_text
 from rig_identification.report.ten_numbers import Element, elements
+from rig_identification.report.words import title, words
 from rig_identification.result import ELEMENTS, Finding, Identification, Mismatch
 
 
@@ -62,6 +58,16 @@ def alternative_views(mismatch: Mismatch) -> list[AlternativeView]:
     return [_alternative(alternative) for alternative in mismatch.alternatives]
 
 
+def placed_findings(findings: Sequence[Finding]) -> list[tuple[str, NDArray[np.float64]]]:
+    """Findings that have a place on the body: name and position, (3,) m in body."""
+    placed = [(f.effect, f.where.get("position")) for f in findings]
+    return [
+        (words(effect), np.asarray(position, dtype=float))
+        for effect, position in placed
+        if isinstance(position, (Sequence, np.ndarray)) and np.all(np.isfinite(position))
+    ]
+
+
 def shifts(identification: Identification) -> list[Shift]:
     """What the findings did to the ten numbers.
 
@@ -83,7 +89,7 @@ def shifts(identification: Identification) -> list[Shift]:
 
 def _view(finding: Finding, index: int) -> FindingView:
     return FindingView(
-        title=_words(finding.effect).capitalize(),
+        title=title(finding.effect),
         anchor=f"finding-{index}",
         statement=finding.statement,
         where=tuple(
@@ -108,8 +114,8 @@ def _alternative(alternative: Mapping[str, object]) -> AlternativeView:
     elif alternative.get("statement"):
         amount = str(alternative["statement"])
     return AlternativeView(
-        effect=_words(str(alternative.get("effect", ""))),
-        where=", ".join(str(place) for place in places if isinstance(place, str)),
+        effect=words(str(alternative.get("effect", ""))),
+        where=", ".join(place for place in places if isinstance(place, str)),
         amount=amount,
         gap=_number(alternative.get("log_likelihood_gap")),
         experiment=str(alternative.get("experiment") or ""),
@@ -120,18 +126,11 @@ def _parameter(name: str, entry: Mapping[str, object]) -> tuple[str, str, str, s
     value, std = _finite(entry.get("value")), _finite(entry.get("std"))
     unit = unit_text(str(entry.get("unit") or ""))
     if value is None:
-        return _words(name), str(entry.get("value", "–")), "", unit
-    if std is None:
-        return _words(name), significant(value, 4), "", unit
-    if value and not 1e-3 <= abs(value) < 1e6:
-        exponent = int(np.floor(np.log10(abs(value))))
-        power = 10.0**exponent
-        return (
-            _words(name),
-            *value_and_half_width(value / power, std / power),
-            f"{power_of_ten(exponent)} {unit}",
-        )
-    return _words(name), *value_and_half_width(value, std), unit
+        return words(name), str(entry.get("value", "–")), "", unit
+    if std is None or std <= 0.0:
+        return words(name), significant(value, 4), "", unit
+    text, half, power = amount(value, std)
+    return words(name), text, half, f"{power} {unit}".strip()
 
 
 def place_text(key: str, value: object) -> str:
@@ -149,10 +148,6 @@ def place_text(key: str, value: object) -> str:
 
 def _time(span: Mapping[str, object]) -> str:
     return f"{span.get('recording')}, {_number(span.get('start'))} s to {_number(span.get('end'))} s"
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _finite(value: object) -> float | None:

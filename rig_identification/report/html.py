@@ -10,15 +10,22 @@ from rig_identification import __version__
 from rig_identification.recording import Session
 from rig_identification.report.channels import finite_channels, recording_views
 from rig_identification.report.determined import determinations, sensors_used
+from rig_identification.report.do_next import next_steps
 from rig_identification.report.doubts import doubt_groups
-from rig_identification.report.findings import alternative_views, finding_views, shifts
+from rig_identification.report.findings import alternative_views, finding_views, placed_findings, shifts
+from rig_identification.report.grades import grade
+from rig_identification.report.identity import digest, recorded_on
+from rig_identification.report.lights import lights
 from rig_identification.report.page import page_environment
 from rig_identification.report.residual_views import rms_table, whiteness_views
-from rig_identification.report.rig_drawing import rig_scene, rig_svgs
+from rig_identification.report.rig_drawing import picture_svg, rig_svgs
+from rig_identification.report.rig_scene import rig_scene
 from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
 from rig_identification.result import Identification
 
+#: How the topic of a simulation's truth ends (recording contract).
+TRUTH = "ground_truth/odometry"
 ROLES = {True: "held out", False: "fitted"}
 
 
@@ -54,7 +61,11 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
     names = [view.name for view in recordings]
     examination = identification.examination
     faults = () if examination is None else examination.faults
-    faulty = frozenset[str]() if examination is None else faulty_parts(examination, session.rig)
+    findings = identification.mismatch.findings
+    faulty = faulty_parts((*faults, *findings), session.rig)
+    spots = placed_findings(findings)
+    scene = rig_scene(session.rig, identification.total, faulty, spots)
+    ten = blocks(identification)
     told = frozenset[str]() if examination is None else frozenset(examination.warnings)
     return {
         "session": session,
@@ -62,7 +73,15 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "roles": roles,
         "notes": (*(note for note in identification.notes if note not in told), *lost),
         "setup": None if examination is None else setup_view(examination),
-        "blocks": blocks(identification),
+        "recorded": recorded_on(session),
+        "digest": digest(session),
+        "marked": ", ".join(sorted(scene.marked | {name for name, _ in scene.spots})),
+        "lights": lights(identification),
+        "steps": next_steps(identification, session),
+        "grade": grade,
+        "blocks": ten,
+        "principal": any(block.principal for block in ten),
+        "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},
         "recordings": recordings,
         "rms_rows": rms_table(channels, names),
         "whiteness": [(v, whiteness_views(channels, v.name)) for v in recordings if v.role != "at rest"],
@@ -72,8 +91,6 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "determinations": determinations(identification, session),
         "sensors": sensors_used(session),
         "doubts": doubt_groups(identification.parameters),
-        "views": [
-            (name, Markup(svg))
-            for name, svg in rig_svgs(rig_scene(session.rig, identification.total, faulty))
-        ],
+        "picture": Markup(picture_svg(scene)),
+        "views": [(name, Markup(svg)) for name, svg in rig_svgs(scene)],
     }

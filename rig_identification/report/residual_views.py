@@ -10,12 +10,12 @@ from markupsafe import Markup
 
 from rig_identification.report.channels import channel_anchor, channel_label
 from rig_identification.report.envelope import envelope
+from rig_identification.report.grades import heat
 from rig_identification.report.line_chart import Curve, Panel, chart_svg
 from rig_identification.report.residuals import ResidualSummary, summarise_residual
 from rig_identification.result import ChannelFit
 
 WIDTH, HEIGHT = 300, 84  # px
-ORDINARY = 1.1  # a residual's size, in units of its noise, that needs no attention
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Cell:
 
     rms: float
     anchor: str
-    heat: int  # percent: 0 as noise, 100 some ten times the noise
+    heat: int  # percent: 0 as noise may be, 100 some ten times that (grades.heat)
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ def rms_table(channels: tuple[ChannelFit, ...], recordings: list[str]) -> list[R
     found: dict[str, dict[str, Cell]] = {}
     for fit in channels:
         rms = fit.rms_in_sigma
-        heat = 0 if rms <= ORDINARY else round(min(25.0 + 75.0 * np.log10(rms / ORDINARY), 100.0))
-        found.setdefault(channel_label(fit), {})[fit.recording] = Cell(rms, channel_anchor(fit), heat)
+        cell = Cell(rms, channel_anchor(fit), heat(rms, len(fit.time), len(channels)))
+        found.setdefault(channel_label(fit), {})[fit.recording] = cell
     return [Row(label, tuple(cells.get(name) for name in recordings)) for label, cells in found.items()]
 
 

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
-from rig_identification.report.principal import principal_inertia
-from rig_identification.report.rest_pose import rest_pose
-from rig_identification.result import ELEMENTS, InertialEstimate
-from rig_identification.rig import Rig
+from rig_identification.report.labels import Box, Label, placed
+from rig_identification.report.rig_scene import Scene
 
 Array = NDArray[np.float64]
 
-WIDTH, HEIGHT, MARGIN = 440, 340, 40  # px of one view
+WIDTH, HEIGHT, MARGIN = 440, 340, 44  # px of one view, less the scale bar
+BAR = 28  # px below a view, for the scale bar: arrows of the axes go up to 50 px beyond what is drawn
+#: px by which the body's outline goes around its hinges, devices and centre of mass: a body on two cables
+#: has hinges on one line, and is drawn all the same.
+AROUND = 12.0
+_CIRCLE = AROUND * np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)[:-1]) for f in (np.cos, np.sin)])
+
 #: m, longest first: a description in millimetres is drawn as it is written.
 _SCALE_BARS = tuple(step * 10.0**power for power in range(4, -4, -1) for step in (5.0, 2.0, 1.0))
 
@@ -43,68 +46,30 @@ VIEWS = (
 )
 
 
-@dataclass(frozen=True)
-class Scene:
-    """What is drawn, in world."""
-
-    cables: tuple[tuple[str, Array, Array], ...]  # name, ceiling point, body point
-    devices: tuple[tuple[str, Array], ...]  # name, position
-    center_of_mass: Array | None
-    ellipsoid: Array | None  # (3, 3) columns are the semi-axes
-    body_axes: tuple[Array, Array]  # origin, columns are x, y, z of body
-    marked: frozenset[str] = frozenset()  # names of cables and devices that are at fault
-
-
-#: Contract's words of the devices that have a place, as they are drawn.
-DRAWN = {"imu": "IMU", "exciter": "exciter", "mocap": "markers"}
-
-
-def rig_scene(rig: Rig, estimate: InertialEstimate, faulty: frozenset[str] = frozenset()) -> Scene:
-    """Place rig, devices and inertia ellipsoid at the rest pose.
-
-    faulty: cables and devices at fault, by the contract's words.
-    """
-    known = not {"cx", "cy", "cz"} & set(estimate.unobservable)
-    center = estimate.values[1:4] if known else np.mean([c.body_point for c in rig.cables], axis=0)
-    R_world_body, origin = rest_pose(rig, center)
-
-    def world(position_body: Array) -> Array:
-        return np.asarray(origin + R_world_body @ position_body)
-
-    mounts = [(name, getattr(rig, device)) for device, name in DRAWN.items()]
-    principal = principal_inertia(estimate)
-    semi = principal.semi_axes if principal is not None and known else None
-    return Scene(
-        cables=tuple((c.name, np.asarray(c.ceiling_point), world(c.body_point)) for c in rig.cables),
-        devices=tuple((name, world(m.position)) for name, m in mounts if m is not None),
-        center_of_mass=world(center) if known else None,
-        ellipsoid=None if semi is None or principal is None else R_world_body @ principal.axes * semi,
-        body_axes=(origin, R_world_body),
-        marked=frozenset(DRAWN.get(name, name) for name in faulty),
-    )
-
-
-def described_scene(rig: Rig, faulty: frozenset[str] = frozenset()) -> Scene:
-    """The rig as described, before anything is known of the body: no centre of mass, no ellipsoid."""
-    nothing = InertialEstimate(np.full(10, np.nan), np.full((10, 10), np.nan), ELEMENTS)
-    return rig_scene(rig, nothing, faulty)
-
-
 def rig_svgs(scene: Scene) -> list[tuple[str, str]]:
     """Name and SVG of each view, all to one scale."""
     boxes = [_extent(scene, view) for view in VIEWS]
-    scale = min(
-        min((WIDTH - 2 * MARGIN) / max(hi[0] - lo[0], 1e-6), (HEIGHT - 2 * MARGIN) / max(hi[1] - lo[1], 1e-6))
-        for lo, hi in boxes
-    )
+    scale = min(_scale(box) for box in boxes)
     return [
         (v.name, _view_svg(scene, v, 0.5 * (lo + hi), scale))
         for v, (lo, hi) in zip(VIEWS, boxes, strict=True)
     ]
 
 
+def picture_svg(scene: Scene) -> str:
+    """The first view by itself, as large as fits."""
+    lower, upper = _extent(scene, VIEWS[0])
+    return _view_svg(scene, VIEWS[0], 0.5 * (lower + upper), _scale((lower, upper)))
+
+
+def _scale(box: tuple[Array, Array]) -> float:
+    """px per m at which a view fits."""
+    width, height = np.maximum(box[1] - box[0], 1e-6)
+    return float(min((WIDTH - 2 * MARGIN) / width, (HEIGHT - 2 * MARGIN) / height))
+
+
 def _extent(scene: Scene, view: View) -> tuple[Array, Array]:
-    points = [p for _, a, b in scene.cables for p in (a, b)] + [p for _, p in scene.devices]
+    points = [p for _, a, b in scene.cables for p in (a, b)] + [p for _, p in (*scene.devices, *scene.spots)]
     flat = np.array(points) @ view.axes.T
     lower, upper = flat.min(axis=0), flat.max(axis=0)
     if scene.center_of_mass is not None:
@@ -121,30 +86,49 @@ def _view_svg(scene: Scene, view: View, middle: Array, scale: float) -> str:
         right, up = view.axes @ position_world - middle
         return np.array([WIDTH / 2 + scale * right, HEIGHT / 2 - scale * up])
 
-    parts = [f'<svg class="rig" viewBox="0 0 {WIDTH} {HEIGHT}" role="img"><title>{view.name}</title>']
-    hinges = np.array([at(b) for _, _, b in scene.cables])
-    parts.append(f'<path class="body" d="{_outline(hinges)}"/>')
+    parts = [f'<svg class="rig" viewBox="0 0 {WIDTH} {HEIGHT + BAR}" role="img"><title>{view.name}</title>']
+    parts.append(f'<path class="body" d="{_outline(np.array([at(p) for p in _body_points(scene)]))}"/>')
     if scene.center_of_mass is not None and scene.ellipsoid is not None:
         parts.append(_ellipse(at(scene.center_of_mass), scale * view.axes @ scene.ellipsoid))
-    drawn = [(name, _cable(name, at(a), at(b))) for name, a, b in scene.cables]
-    drawn += [(name, _device(name, at(p))) for name, p in scene.devices]
+    drawn = [(name, _cable(at(a), at(b))) for name, a, b in scene.cables]
+    drawn += [(name, _device(at(p))) for name, p in scene.devices]
     parts += [drawing for name, drawing in drawn if name not in scene.marked]
-    parts += _body_axes(scene, at)
+    axes, taken = _body_axes(scene, at)
+    parts += axes
+    labels = placed(_labels(scene, at), WIDTH, HEIGHT, [*taken, _scale_box(scale)])
+    parts += [label.svg for label in labels if not label.faulty]
     # What is at fault lies on top of all else
-    parts += [f'<g class="faulty">{drawing}</g>' for name, drawing in drawn if name in scene.marked]
+    drawn += [(name, _spot(at(p))) for name, p in scene.spots]
+    marked = scene.marked | {name for name, _ in scene.spots}
+    written = {label.text: label.svg for label in labels if label.faulty}
+    parts += [
+        f'<g class="faulty">{drawing}{written.get(name, "")}</g>' for name, drawing in drawn if name in marked
+    ]
     if scene.center_of_mass is not None:
         parts.append(_center_mark(at(scene.center_of_mass)))
     parts.append(_scale_bar(scale))
     return "".join(parts) + "</svg>"
 
 
+def _body_points(scene: Scene) -> list[Array]:
+    """What is surely part of the body: hinges, devices, centre of mass; m, world."""
+    points = [b for _, _, b in scene.cables] + [p for _, p in scene.devices]
+    return points if scene.center_of_mass is None else [*points, scene.center_of_mass]
+
+
+def _labels(scene: Scene, at: Callable[[Array], Array]) -> list[Label]:
+    """Names of cables (at the ceiling), devices and what else was found."""
+    points = [(name, at(a), name in scene.marked) for name, a, _ in scene.cables]
+    points += [(name, at(p), name in scene.marked) for name, p in scene.devices]
+    points += [(name, at(p), True) for name, p in scene.spots]
+    return [Label(name, float(p[0]), float(p[1]), faulty) for name, p, faulty in points]
+
+
 def _outline(points: Array) -> str:
-    """Convex outline of the hinges on the body, or the line that they lie on."""
-    try:
-        points = points[ConvexHull(points).vertices]
-    except (QhullError, ValueError):
-        points = points[np.lexsort(points.T)][[0, -1]]
-    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + "Z"
+    """Convex outline around points of the body, (n, 2) px, at a distance."""
+    around = np.concatenate([point + _CIRCLE for point in points])
+    around = around[ConvexHull(around).vertices]
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in around) + "Z"
 
 
 def _ellipse(center: Array, semi_axes: Array) -> str:
@@ -159,30 +143,29 @@ def _ellipse(center: Array, semi_axes: Array) -> str:
     )
 
 
-def _cable(name: str, top: Array, bottom: Array) -> str:
-    line = f'<path class="cable" d="M{top[0]:.1f} {top[1]:.1f}L{bottom[0]:.1f} {bottom[1]:.1f}"/>'
-    ceiling = f'<path class="ceiling" d="M{top[0] - 9:.1f} {top[1]:.1f}h18"/>'
-    hinge = f'<circle class="hinge" cx="{bottom[0]:.1f}" cy="{bottom[1]:.1f}" r="3"/>'
+def _cable(top: Array, bottom: Array) -> str:
     return (
-        line
-        + ceiling
-        + hinge
-        + f'<text class="mid" x="{top[0]:.1f}" y="{top[1] - 7:.1f}">{escape(name)}</text>'
+        f'<path class="cable" d="M{top[0]:.1f} {top[1]:.1f}L{bottom[0]:.1f} {bottom[1]:.1f}"/>'
+        f'<path class="ceiling" d="M{top[0] - 9:.1f} {top[1]:.1f}h18"/>'
+        f'<circle class="hinge" cx="{bottom[0]:.1f}" cy="{bottom[1]:.1f}" r="3"/>'
     )
 
 
-def _device(name: str, point: Array) -> str:
+def _device(point: Array) -> str:
     x, y = point
-    return (
-        f'<rect class="device" x="{x - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>'
-        f'<text x="{x + 9:.1f}" y="{y + 4:.1f}">{escape(name)}</text>'
-    )
+    return f'<rect class="device" x="{x - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>'
 
 
-def _body_axes(scene: Scene, at: Callable[[Array], Array]) -> list[str]:
+def _spot(point: Array) -> str:
+    x, y = point
+    return f'<path class="spot" d="M{x - 6:.1f} {y - 6:.1f}l12 12m0 -12l-12 12"/>'
+
+
+def _body_axes(scene: Scene, at: Callable[[Array], Array]) -> tuple[list[str], list[Box]]:
+    """Arrows of the body's axes with their letters, and what the letters cover."""
     origin, R_world_body = scene.body_axes
     start = at(origin)
-    parts = []
+    parts, covered = [], []
     for name, direction in zip("xyz", R_world_body.T, strict=True):
         unit = at(origin + direction) - start
         size = np.linalg.norm(unit)
@@ -191,11 +174,12 @@ def _body_axes(scene: Scene, at: Callable[[Array], Array]) -> list[str]:
             continue  # points at the reader
         tip = start + unit * (40.0 / full)
         label = start + unit / size * (np.linalg.norm(tip - start) + 8.0)
+        covered.append((label[0] - 5.0, label[1] - 8.0, label[0] + 5.0, label[1] + 6.0))
         parts.append(
             f'<path class="frame" d="M{start[0]:.1f} {start[1]:.1f}L{tip[0]:.1f} {tip[1]:.1f}"/>'
             f'<text class="mid frame" x="{label[0]:.1f}" y="{label[1] + 4:.1f}">{name}</text>'
         )
-    return parts
+    return parts, covered
 
 
 def _center_mark(point: Array) -> str:
@@ -208,9 +192,17 @@ def _center_mark(point: Array) -> str:
 
 
 def _scale_bar(scale: float) -> str:
-    length = next((s for s in _SCALE_BARS if s * scale <= 110.0), 0.0)
-    text = f"{length:g} m"
+    length = _bar_length(scale)
     return (
-        f'<path class="scale" d="M{MARGIN / 2:.1f} {HEIGHT - 14}v5h{length * scale:.1f}v-5"/>'
-        f'<text x="{MARGIN / 2 + length * scale + 6:.1f}" y="{HEIGHT - 7}">{text}</text>'
+        f'<path class="scale" d="M{MARGIN / 2:.1f} {HEIGHT + BAR - 14}v5h{length * scale:.1f}v-5"/>'
+        f'<text x="{MARGIN / 2 + length * scale + 6:.1f}" y="{HEIGHT + BAR - 7}">{length:g} m</text>'
     )
+
+
+def _bar_length(scale: float) -> float:
+    """A round length (m) that takes at most 110 px."""
+    return next((s for s in _SCALE_BARS if s * scale <= 110.0), 0.0)
+
+
+def _scale_box(scale: float) -> Box:
+    return 0.0, HEIGHT + BAR - 20.0, MARGIN / 2 + _bar_length(scale) * scale + 56.0, float(HEIGHT + BAR)

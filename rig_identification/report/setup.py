@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 
 from rig_identification.examination import Examination, RestReading, SetupFault, TopicAccount
+from rig_identification.quantity import decimals, number, significant, unit_text
 from rig_identification.report.findings import place_text
-from rig_identification.report.quantity import decimals, number, significant, unit_text
+from rig_identification.report.words import device_words, title, words
+from rig_identification.result import Finding
 from rig_identification.rig import Rig
 
 #: Beyond this many standard deviations a reading at rest is not as described (0.3 % of sound ones by chance).
@@ -132,11 +134,11 @@ def topic_views(examination: Examination) -> list[tuple[str, list[TopicView]]]:
     return [(name, [_topic(topic) for topic in topics]) for name, topics in grouped]
 
 
-def faulty_parts(examination: Examination, rig: Rig) -> frozenset[str]:
-    """Cables and devices that a fault names, by the contract's words, one by one or as all of them."""
+def faulty_parts(told: Iterable[SetupFault | Finding], rig: Rig) -> frozenset[str]:
+    """Cables and devices that faults or findings name, by the contract's words, alone or all together."""
     cables = {cable.name for cable in rig.cables}
     known = cables | {"imu", "inclinometer", "exciter", "mocap"}
-    named = {word for fault in examination.faults for word in _words_in((fault.where, fault.parameters))}
+    named = {word for fault in told for word in _words_in((fault.where, fault.parameters))}
     if named & _ALL_CELLS:
         named |= cables
     return frozenset(known if _ALL in named else known & named)
@@ -156,7 +158,7 @@ def _words_in(value: object) -> Iterator[str]:
 
 def _fault(fault: SetupFault, index: int) -> FaultView:
     return FaultView(
-        title=fault.effect.replace("_", " ").capitalize(),
+        title=title(fault.effect),
         anchor=f"fault-{index}",
         statement=fault.statement,
         advice=fault.advice,
@@ -177,7 +179,7 @@ def _tie(alternative: Mapping[str, object]) -> TieView:
 def _rest(reading: RestReading) -> RestView:
     off = (reading.measured - reading.expected) / reading.std if reading.std > 0.0 else 0.0
     places = decimals(reading.std)
-    name = " ".join(filter(None, (reading.device, reading.quantity.replace("_", " "), reading.axis)))
+    name = " ".join(filter(None, (device_words(reading.device), words(reading.quantity), reading.axis)))
     return RestView(
         reading.recording, name, number(reading.measured, places), number(reading.expected, places),
         unit_text(reading.unit), number(off, 1) if abs(off) < 1e4 else significant(off, 2), abs(off) > FAR,

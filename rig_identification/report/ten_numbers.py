@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig_identification.quantity import Z_95, number, significant, value_and_half_width
 from rig_identification.report.principal import PrincipalInertia, principal_inertia
-from rig_identification.report.quantity import Z_95, number, significant, value_and_half_width
 from rig_identification.report.result_json import INERTIA_INDEX
 from rig_identification.result import ELEMENTS, Identification, InertialEstimate
 

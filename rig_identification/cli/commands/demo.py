@@ -16,7 +16,13 @@ from rig_identification.cli.simulated import write_simulated
 from rig_identification.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rig_identification.result import InertialEstimate
     from rig_identification.simulate import SessionSpec
+
+    Array = NDArray[np.float64]
 
 SESSION = "session"
 
@@ -45,7 +51,20 @@ def run(arguments: argparse.Namespace) -> None:
     session, truth = simulate_session(demo_spec(arguments.duration), np.random.default_rng(arguments.seed))
     write_simulated(session, truth, folder, overwrite=True)
     print(f"session: {folder}")
-    identify_session(folder, arguments.out)
+    identify_session(folder, arguments.out, remark=lambda found: beside_truth(found.total, truth.elements))
+
+
+def beside_truth(estimate: InertialEstimate, true: Array) -> str:
+    """How far the ten numbers lie from those of the simulation, (10,) in the order of the estimate's."""
+    import numpy as np
+
+    from rig_identification.result import ELEMENTS
+
+    known = [i for i, name in enumerate(ELEMENTS) if name not in estimate.unobservable]
+    off = np.abs(estimate.values - true)[known] / np.sqrt(np.diag(estimate.covariance)[known])
+    farthest = ELEMENTS[known[int(np.argmax(off))]]
+    within = f"{len(known)} numbers within {off.max():.1f} σ"
+    return f"beside the simulation's truth: {within}, {farthest} the farthest"
 
 
 def demo_spec(duration: float) -> SessionSpec:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from rig_identification.cli.output import check_output_folder, write_together
@@ -31,9 +32,15 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def identify_session(
-    path: Path, out: Path, namespace: str = "/rig", topics: dict[str, str] | None = None
+    path: Path,
+    out: Path,
+    namespace: str = "/rig",
+    topics: dict[str, str] | None = None,
+    remark: Callable[[Identification], str] | None = None,
 ) -> None:
     """Identify the session at ``path`` into the folder ``out`` and print the ten numbers.
+
+    remark: what else there is to say of the answer; printed before the report's name.
 
     Raises
     ------
@@ -49,7 +56,7 @@ def identify_session(
         identification = identify_prepared(prepared, progress)
         progress("writing the report")
         _write(identification, prepared.session, out)
-    _print(identification, out)
+    _print(identification, out, remark)
 
 
 def _write(identification: Identification, session: Session, out: Path) -> None:
@@ -64,8 +71,10 @@ def _write(identification: Identification, session: Session, out: Path) -> None:
     )
 
 
-def _print(identification: Identification, out: Path) -> None:
+def _print(identification: Identification, out: Path, remark: Callable[[Identification], str] | None) -> None:
     from rig_identification.cli.summary import summary
 
     print(summary(identification))
+    if remark is not None:
+        print(remark(identification))
     print(f"report: {out / REPORT}")

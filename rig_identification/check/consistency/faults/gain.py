@@ -10,6 +10,7 @@ from rig_identification.check.consistency.hypothesis import Change, Hypothesis, 
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import Loosened
 from rig_identification.examination import SetupFault
+from rig_identification.quantity import with_interval
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
@@ -33,7 +34,7 @@ def _gains(cells: tuple[str, ...], names: tuple[str, ...]) -> Hypothesis:
     def describe(rest: RestFit | None) -> SetupFault:
         found = {} if rest is None else gains(rest)
         told = ", ".join(
-            f"{name} {100.0 * gain:+.1f} ± {100.0 * std:.1f} %" for name, (gain, std) in found.items()
+            f"{name} {with_interval(100.0 * gain, 100.0 * std)} %" for name, (gain, std) in found.items()
         )
         gain, std = next(iter(found.values()), (0.0, 0.0))
         return fault(

@@ -14,6 +14,7 @@ from rig_identification.check.consistency.hypothesis import Change, Hypothesis, 
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import Loosened
 from rig_identification.examination import SetupFault
+from rig_identification.quantity import with_interval
 from rig_identification.recording import Dummy
 
 
@@ -84,9 +85,8 @@ def _wrong(
             place, place_std = (v[3 * k : 3 * k + 3] for v in rest.value("dummy_place"))
             if loosened.dummy_mass:
                 numbers["mass"] = (dummy.mass + mass, mass_std, "kg")
-                parts.append(
-                    f"{dummy.mass + mass:.4g} ± {mass_std:.2g} kg hung in {name}, not {dummy.mass:g} kg"
-                )
+                hung = with_interval(dummy.mass + mass, mass_std, "kg")
+                parts.append(f"{hung} hung in {name}, not {dummy.mass:g} kg")
             if loosened.dummy_place:
                 numbers["distance"] = (float(np.linalg.norm(place)), float(np.linalg.norm(place_std)), "m")
                 at = ", ".join(f"{v:.3f}" for v in dummy.position + place)

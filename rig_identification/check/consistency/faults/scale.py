@@ -12,6 +12,7 @@ from rig_identification.check.consistency.faults.unit import POUND
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.examination import SetupFault
+from rig_identification.quantity import with_interval
 from rig_identification.rig import Rig
 
 
@@ -57,7 +58,7 @@ def _another(evidence: Evidence, mass: float) -> Hypothesis:
             "mass_error",
             {"channel": "description", "kind": "another_mass"},
             {"mass": (found, std, "kg")},
-            f"The load cells carry {found:.5g} ± {std:.2g} kg, the rig description says {mass:g} kg.",
+            f"The load cells carry {with_interval(found, std, 'kg')}, the rig description says {mass:g} kg.",
             "Weigh body and frame together anew. Until then the mass is estimated from the load cells.",
         )
 

@@ -1,4 +1,8 @@
-"""Numbers as a person reads them: as many digits as the interval deserves."""
+"""Numbers as a person reads them: as many digits as the interval deserves.
+
+Every ± that a person reads is the half-width of a 95 % interval, on the page as in a sentence. A standard
+deviation stands in ``result.json`` alone, under the key ``std``.
+"""
 
 from __future__ import annotations
 
@@ -47,6 +51,46 @@ def value_and_half_width(value: float, std: float) -> tuple[str, str]:
     half = Z_95 * std
     places = decimals(half)
     return number(value, places), number(half, places) if np.isfinite(half) else "–"
+
+
+def exponent(value: float, std: float) -> int:
+    """Power of ten that a value with its interval is written with.
+
+    0 where digits can be counted: from a thousandth up to a hundred thousand.
+    """
+    largest = max(abs(value), Z_95 * std if np.isfinite(std) else 0.0)
+    if largest == 0.0 or not np.isfinite(largest) or 1e-3 <= largest < 1e5:
+        return 0
+    return int(np.floor(np.log10(largest)))
+
+
+def amount(value: float, std: float) -> tuple[str, str, str]:
+    """A value, the half-width of its 95 % interval, and the power of ten both are times; "" where it is 1."""
+    power = exponent(value, std)
+    scale = 10.0**power
+    return *value_and_half_width(value / scale, std / scale), power_of_ten(power) if power else ""
+
+
+def with_interval(value: float, std: float, unit: str = "1") -> str:
+    """A value with the half-width of its 95 % interval, for a sentence: ``148.0 ± 2.0 N/m``.
+
+    Digits can be pasted into a calculation: no thin spaces, a minus sign of ASCII.
+    """
+    number_text, half, power = amount(value, std)
+    if not np.isfinite(std) or std <= 0.0:
+        told = significant(value, 4)
+    else:
+        told = f"({number_text} ± {half}){power}" if power else f"{number_text} ± {half}"
+    return _pasteable(f"{told} {unit_text(unit)}".strip())
+
+
+def plain_figure(value: float, digits: int = 3) -> str:
+    """A number of stated significant digits for a sentence: 38200, not 3.82e+04."""
+    return _pasteable(significant(value, digits))
+
+
+def _pasteable(text: str) -> str:
+    return text.replace("\u202f", "").replace("−", "-")
 
 
 def unit_text(unit: str) -> str:
