@@ -34,8 +34,9 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
     seen: dict[str, object] = {}
 
     def install(outcome: object) -> None:
-        def identify(given: Session, *, progress: object = None) -> Identification:
+        def identify(given: Session, *, progress: object = None, work: float = 0.0) -> Identification:
             assert given is session
+            seen["work"] = work
             if isinstance(outcome, BaseException):
                 raise outcome
             return identification

@@ -77,7 +77,10 @@ def fitted_whole(
         told = "unexplained"
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
     mismatch = Mismatch(told, text, findings, tuple(search.rivals))
-    return Explained(fitted, mismatch, ideal, loose, trace, search.bodies, can_be)
+    outcome = Explained(fitted, mismatch, ideal, loose, trace, search.bodies, can_be)
+    if outcome.told:
+        search.heard(outcome)
+    return outcome
 
 
 def strayed(fitted: Fitted) -> bool:

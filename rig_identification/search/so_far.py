@@ -1,0 +1,72 @@
+"""What an answer has come to so far: the best model of the session until now, and the work that it took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rig_identification.estimate.identify import Ideal, compose, scores
+from rig_identification.estimate.verdict import hear
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.explained import Explained
+from rig_identification.recording import Session
+from rig_identification.result import Identification, Work
+
+#: What is told of an answer that did not come to its end.
+INTERRUPTED = (
+    "Interrupted before the search for what the ideal model leaves out had ended: this is the best answer until "
+    "then. What was not tried yet may explain the recordings better."
+)
+
+
+@dataclass
+class SoFar:
+    """The best answer to a session until now."""
+
+    session: Session
+    ideal: Ideal
+    budget: Budget
+    found: Explained | None = None  # what explains the session
+    swinging: Identification | None = None  # the answer to a body that is only watched
+
+    def hear(self, found: Explained) -> None:
+        """Keep what explains the session; what leaves only noise is not given up for what leaves a trace."""
+        if found.wholly or self.found is None or not self.found.wholly:
+            self.found = found
+
+    def interrupted(self) -> Identification:
+        """The answer where the search is broken off here, marked so."""
+        answer = self.swinging or self._plain()
+        if self.found is not None:
+            answer = answer_with(self.found, self.session, self._plain())
+        return interrupted(accounted(answer, self.budget))
+
+    def _plain(self) -> Identification:
+        """The ideal model's answer; where it leaves something, as loosely as its residuals ask for."""
+        ideal, loose = self.ideal, 1.0
+        if ideal.mismatch.verdict != "none" and ideal.careful is None:
+            loose = hear(ideal.fitted).looseness
+        return compose(self.session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful, loose)
+
+
+def answer_with(found: Explained, session: Session, plain: Identification) -> Identification:
+    """The answer with what was found in the model. plain: the ideal model's."""
+    careful = None if found.told else found.ideal.careful
+    answer = compose(
+        session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
+    )
+    return replace(answer, figures={**answer.figures, "ideal": plain})
+
+
+def interrupted(answer: Identification) -> Identification:
+    """The answer, marked as the best one before the user broke the search off."""
+    return replace(answer, notes=(INTERRUPTED, *answer.notes), interrupted=True)
+
+
+def accounted(answer: Identification, budget: Budget) -> Identification:
+    """The answer with the work that it took, and what was left untried, in a field and in words."""
+    work = Work(budget.used, budget.limit, tuple(budget.untried))
+    text = f"{work.used:.3g} units of work were computed; the search begins nothing new after {work.limit:g}."
+    if budget.spent():
+        left = ", ".join(work.untried) or "no hypothesis that promised enough, but not every rival was compared"
+        text += f" It ended there. Left untried: {left}. The option --work gives it more."
+    return replace(answer, work=work, notes=(*answer.notes, text))
