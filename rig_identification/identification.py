@@ -52,8 +52,8 @@ def identify_prepared(
 ) -> Identification:
     """Identify the body, and tell the faults of the set-up with what the fit found.
 
-    work: units of work after which the search for what the ideal model leaves out begins nothing new; None: as many
-    as mismatch/budget.py has.
+    work: units of work after which the search for what the ideal model leaves out begins nothing new; None:
+    as many as mismatch/budget.py has.
 
     Raises
     ------

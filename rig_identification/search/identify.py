@@ -34,11 +34,11 @@ from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.stretched_at_first import with_stretch_told
 from rig_identification.mismatch.watched import Watched, explain_watched
-from rig_identification.recording import Session
 from rig_identification.model.work import counted
+from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted
 from rig_identification.search.search import search
-from rig_identification.search.so_far import SoFar, accounted, answer_with, interrupted
+from rig_identification.search.so_far import SoFar, accounted, interrupted
 
 Progress = Callable[[str, float], None]
 
@@ -186,7 +186,7 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
             # Where much is left a model follows the data with a discrepancy, and none has to by itself
             named = _followed(so_far, searching)
             if named is not None and named.wholly:
-                return answer_with(named, session, _plain(so_far))
+                return so_far.with_findings(named, _plain(so_far))
         ideal = so_far.ideal = with_pieces(ideal, searching)
     plain = _plain(so_far)
     swinging = None
@@ -208,14 +208,16 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
     if followed and near_noise(fitted) and not _answered(ideal, found):
         named = _followed(so_far, searching)
     if named is not None and not _answered(ideal, found):
-        return answer_with(named, session, plain)
+        return so_far.with_findings(named, plain)
     if found is None:
         ideal = so_far.ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
         return plain if note is None else replace(plain, notes=(*plain.notes, note))
     if found.mismatch.verdict == "none":
-        return compose(session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies)
-    return answer_with(found, session, plain)
+        return compose(
+            session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies
+        )
+    return so_far.with_findings(found, plain)
 
 
 def _plain(so_far: SoFar) -> Identification:

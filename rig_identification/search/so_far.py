@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 from rig_identification.estimate.identify import Ideal, compose, scores
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.explained import Explained
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Work
 
 #: What is told of an answer that did not come to its end.
 INTERRUPTED = (
-    "Interrupted before the search for what the ideal model leaves out had ended: this is the best answer until "
-    "then. What was not tried yet may explain the recordings better."
+    "Interrupted before the search for what the ideal model leaves out had ended: this is the best answer "
+    "until then. What was not tried yet may explain the recordings better."
 )
 
 
@@ -33,12 +34,24 @@ class SoFar:
         if found.wholly or self.found is None or not self.found.wholly:
             self.found = found
 
+    def with_findings(self, found: Explained, plain: Identification) -> Identification:
+        """The answer with what was found in the model, each finding weighed. plain: the ideal model's."""
+        return self._composed(each_by_itself(found, self.budget.late), plain)
+
     def interrupted(self) -> Identification:
         """The answer where the search is broken off here, marked so."""
         answer = self.swinging or self._plain()
         if self.found is not None:
-            answer = answer_with(self.found, self.session, self._plain())
+            answer = self._composed(not_weighed(self.found), self._plain())
         return interrupted(accounted(answer, self.budget))
+
+    def _composed(self, found: Explained, plain: Identification) -> Identification:
+        careful = None if found.told else found.ideal.careful
+        fitted = found.fitted
+        answer = compose(
+            self.session, fitted, scores(fitted), found.mismatch, careful, found.loose, found.bodies
+        )
+        return replace(answer, figures={**answer.figures, "ideal": plain})
 
     def _plain(self) -> Identification:
         """The ideal model's answer; where it leaves something, as loosely as its residuals ask for."""
@@ -46,15 +59,6 @@ class SoFar:
         if ideal.mismatch.verdict != "none" and ideal.careful is None:
             loose = hear(ideal.fitted).looseness
         return compose(self.session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful, loose)
-
-
-def answer_with(found: Explained, session: Session, plain: Identification) -> Identification:
-    """The answer with what was found in the model. plain: the ideal model's."""
-    careful = None if found.told else found.ideal.careful
-    answer = compose(
-        session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
-    )
-    return replace(answer, figures={**answer.figures, "ideal": plain})
 
 
 def interrupted(answer: Identification) -> Identification:
@@ -67,6 +71,6 @@ def accounted(answer: Identification, budget: Budget) -> Identification:
     work = Work(budget.used, budget.limit, tuple(budget.untried))
     text = f"{work.used:.3g} units of work were computed; the search begins nothing new after {work.limit:g}."
     if budget.spent():
-        left = ", ".join(work.untried) or "no hypothesis that promised enough, but not every rival was compared"
+        left = ", ".join(work.untried) or "nothing by name, but not every rival was followed to its end"
         text += f" It ended there. Left untried: {left}. The option --work gives it more."
     return replace(answer, work=work, notes=(*answer.notes, text))
