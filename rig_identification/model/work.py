@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-#: What is counted, in units of work as people see them: PLACEHOLDER
+#: What is counted is a column carried over a node of a run: integrated, read and filtered. A core takes 0.9
+#: to 1.0 microseconds for it (three recordings of 32 s at 100 Hz, 12 states, 70 to 180 columns; whatever else takes
+#: time is weighed to the same), so that a unit of work is about a second of one core.
 UNIT = 1_000_000
 
 

@@ -60,6 +60,8 @@ def search(
 
     budget: how much it may compute. heard: is told what explains the session, as it is found.
     """
+    if budget.spent():
+        return None, None
     fitted = ideal.fitted
     problem = with_reference(replace(fitted.problem, discrepancy=None), fitted.rest)
     notify("search: the motion as recorded", 0.05)
