@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 #: Unit of a start-state coordinate (m, rad, m/s, rad/s): keeps the vector's entries alike.
 START_UNIT = 0.01
-#: What a run's residuals alone take, in columns (model/work.py): a motion in state and wrench, and the filter.
+#: What a run's residuals alone take, in columns (model/work.py): motion in state and wrench, and the filter.
 #: Measured on three recordings: 43 to 48. Of that and of each column six parts in ten go with the number of
 #: steps between two nodes.
 BARE, STEPPED = 46, 6

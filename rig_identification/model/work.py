@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 #: What is counted is a column carried over a node of a run: integrated, read and filtered. A core takes 0.9
-#: to 1.0 microseconds for it (three recordings of 32 s at 100 Hz, 12 states, 70 to 180 columns; whatever else takes
-#: time is weighed to the same), so that a unit of work is about a second of one core.
+#: to 1.0 microseconds for it: three recordings of 32 s at 100 Hz, 12 states, 70 to 180 columns. Whatever else
+#: takes time is weighed to the same, so that a unit of work is about a second of one core.
 UNIT = 1_000_000
 
 
