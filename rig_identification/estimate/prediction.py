@@ -234,6 +234,12 @@ def _shown_at(run: Run, channel: Channel, own: Array, parameters: ParameterSet) 
     return np.asarray(np.clip(channel.node - round(late / run.grid.step), 0, run.grid.nodes - 1))
 
 
+def _taken(substeps: int, states: int, columns: int) -> int:
+    """Work (model/work.py) of a node of a run with so many steps to the next, states and columns."""
+    steps = 10 - STEPPED + STEPPED * substeps
+    return steps * (BARE + columns) * states // (10 * layout.BODY_STATE)
+
+
 def linearise_run(
     bench: Bench,
     run: Run,
@@ -271,8 +277,7 @@ def linearise_run(
         substeps=substeps,
         threads=spare(),
     )
-    each = (10 - STEPPED + STEPPED * substeps) * (BARE + known + starts) // 10
-    work.add(motion.nodes * each)
+    work.add(motion.nodes * _taken(substeps, motion.states.shape[1], known + starts))
     if not motion.complete:
         return None
     own = parameters.device(theta)

@@ -32,7 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default=WORK,
         metavar="UNITS",
         help="after so many units of work the search for what the ideal model leaves out begins nothing new; "
-        f"default {WORK:g}, of which a present-day core does about one a second",
+        f"default {WORK:g}, about two minutes of two cores",
     )
 
 
