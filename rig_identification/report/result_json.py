@@ -28,7 +28,7 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         ``mismatch`` holds one key more, ``ideal_model``: mass, centre of mass, inertia and what is
         unobservable as the ideal model alone has them. Where the session was examined, ``check`` holds
         what was found before anything was fitted. ``work`` says what the answer took, where it was counted,
-        and ``interrupted`` whether the user broke the search off.
+        and ``interrupted`` is there, and true, where the user broke the search off.
     """
     total = identification.total
     without_frame = identification.without_frame
@@ -42,7 +42,7 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
             **_ideal_model(identification.figures.get("ideal")),
         },
         **_work(identification.work),
-        "interrupted": identification.interrupted,
+        **({"interrupted": True} if identification.interrupted else {}),
         **({} if identification.examination is None else {"check": check_part(identification.examination)}),
     }
 
