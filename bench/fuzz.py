@@ -5,7 +5,7 @@ from the project's own simulator, or from smooth numbers where no simulator make
 examined, cleaned, identified and written as ``rig-identification identify`` does, in a process of its own
 with a limit on its processor time, and ends as 0 (answered), 2 (refused in a line), 1 (a defect) or "limit".
 
-    nice python -m bench.fuzz --sessions 2000 [--first 0] [--workers 2] [--seconds 120] [--out FILE]
+    nice python -m bench.fuzz --sessions 2000 [--first 0] [--workers 2] [--work UNITS] [--out FILE]
     python -m bench.fuzz --replay SEED [--shrink]
 """
 
@@ -32,16 +32,17 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from bench.fuzz_sessions import Recipe, recipe_of, session_of, simpler
 from rig_identification.errors import InputError
+from rig_identification.mismatch.budget import WORK
 
 #: What stands in a page beside its texts.
 UNREAD = re.compile(r"<(style|script|svg).*?</\1>", flags=re.DOTALL)
 NAN = re.compile(r"(?<![A-Za-z])nan(?![A-Za-z])")
 
 
-def answered(recipe: Recipe, seconds: float) -> str:
+def answered(recipe: Recipe, work: float) -> str:
     """Everything that ``identify`` does, into a folder that goes; the verdict. Raises what it raises.
 
-    seconds: after which the search for left-out physics begins nothing new.
+    work: units of work after which the search for left-out physics begins nothing new.
     """
     from rig_identification.identification import prepare, with_examination
     from rig_identification.report import write_report, write_result
@@ -51,7 +52,7 @@ def answered(recipe: Recipe, seconds: float) -> str:
     if not raw.recordings:
         raise InputError("nothing is recorded")
     prepared = prepare(raw)
-    found = with_examination(identify(prepared.session, seconds=seconds), prepared.examination)
+    found = with_examination(identify(prepared.session, work=work), prepared.examination)
     with tempfile.TemporaryDirectory() as folder:
         result, page = Path(folder) / "result.json", Path(folder) / "report.html"
         write_result(found, result)
@@ -73,7 +74,7 @@ class Ended:
     where: str = ""  # of a defect
 
 
-def _child(recipe: Recipe, seconds: float, limit: int, pipe: Connection) -> None:
+def _child(recipe: Recipe, work: float, limit: int, pipe: Connection) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5))
 
     def late(*_: object) -> None:
@@ -81,7 +82,7 @@ def _child(recipe: Recipe, seconds: float, limit: int, pipe: Connection) -> None
 
     signal.signal(signal.SIGXCPU, late)
     try:
-        ended = ("0", answered(recipe, seconds), "")
+        ended = ("0", answered(recipe, work), "")
     except InputError as error:
         ended = ("2", str(error), "")
     except TimeoutError:
@@ -92,11 +93,11 @@ def _child(recipe: Recipe, seconds: float, limit: int, pipe: Connection) -> None
     pipe.close()
 
 
-def attempt(recipe: Recipe, seconds: float, limit: int) -> Ended:
+def attempt(recipe: Recipe, work: float, limit: int) -> Ended:
     """One session in a process of its own. limit: s of its processor."""
     context = multiprocessing.get_context("fork")
     mine, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_child, args=(recipe, seconds, limit, theirs))
+    process = context.Process(target=_child, args=(recipe, work, limit, theirs))
     process.start()
     theirs.close()
     try:
@@ -114,14 +115,14 @@ def attempt(recipe: Recipe, seconds: float, limit: int) -> Ended:
     return Ended(recipe.seed, status, said, round(float(spent), 1), where)
 
 
-def simplest(recipe: Recipe, seconds: float, limit: int) -> Recipe:
+def simplest(recipe: Recipe, work: float, limit: int) -> Recipe:
     """The simplest recipe found that ends in the same defect."""
-    said = attempt(recipe, seconds, limit).said.partition(":")[0]
+    said = attempt(recipe, work, limit).said.partition(":")[0]
     going = True
     while going:
         going = False
         for other in simpler(recipe):
-            ended = attempt(other, seconds, limit)
+            ended = attempt(other, work, limit)
             if ended.status == "1" and ended.said.partition(":")[0] == said:
                 recipe, going = other, True
                 break
@@ -137,7 +138,7 @@ def main() -> None:
     parser.add_argument(
         "--limit", type=int, default=600, help="s of processor time that one session may take"
     )
-    parser.add_argument("--seconds", type=float, default=120.0, help="s for the search of left-out physics")
+    parser.add_argument("--work", type=float, default=WORK, help="units, for the search of left-out physics")
     parser.add_argument("--longest", type=float, default=1800.0, help="s; longer runs are drawn to last this")
     parser.add_argument("--out", type=Path, help="file of one JSON line a session")
     parser.add_argument("--replay", type=int, help="one seed, with what it is made of")
@@ -151,16 +152,16 @@ def main() -> None:
     if arguments.replay is not None:
         one = recipe(arguments.replay)
         if arguments.shrink:
-            one = simplest(one, arguments.seconds, arguments.limit)
+            one = simplest(one, arguments.work, arguments.limit)
         print(one)
-        ended = attempt(one, arguments.seconds, arguments.limit)
+        ended = attempt(one, arguments.work, arguments.limit)
         print(ended.status, ended.said, f"{ended.seconds} s")
         print(ended.where)
         return
     counts: Counter[str] = Counter()
     with ThreadPoolExecutor(arguments.workers) as pool:
         seeds = range(arguments.first, arguments.first + arguments.sessions)
-        for ended in pool.map(lambda seed: attempt(recipe(seed), arguments.seconds, arguments.limit), seeds):
+        for ended in pool.map(lambda seed: attempt(recipe(seed), arguments.work, arguments.limit), seeds):
             counts[ended.status] += 1
             if arguments.out is not None:
                 with arguments.out.open("a", encoding="utf-8") as stream:

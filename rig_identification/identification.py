@@ -13,7 +13,7 @@ from rig_identification.errors import InputError
 from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
 from rig_identification.recording import Session
-from rig_identification.result import Finding, Identification, Mismatch
+from rig_identification.result import Finding, Identification, Interrupted, Mismatch
 from rig_identification.session import clean
 
 Progress = Callable[[str, float], None]
@@ -47,14 +47,28 @@ def prepare(raw: RawSession, progress: Callable[[str], None] | None = None) -> P
         raise InputError(f"{error}. Found before: {found}") from error
 
 
-def identify_prepared(prepared: Prepared, progress: Progress | None = None) -> Identification:
+def identify_prepared(
+    prepared: Prepared, progress: Progress | None = None, work: float | None = None
+) -> Identification:
     """Identify the body, and tell the faults of the set-up with what the fit found.
 
-    Raises InputError where the session holds nothing to fit.
+    work: units of work after which the search for what the ideal model leaves out begins nothing new; None:
+    as many as mismatch/budget.py has.
+
+    Raises
+    ------
+    InputError
+        The session holds nothing to fit.
+    Interrupted
+        The user broke the search off; it holds the best answer until then.
     """
     from rig_identification.search.identify import identify  # compiles: not before a session is there
 
-    return with_examination(identify(prepared.session, progress=progress), prepared.examination)
+    try:
+        found = identify(prepared.session, progress=progress, work=work)
+    except Interrupted as stopped:
+        raise Interrupted(with_examination(stopped.answer, prepared.examination)) from stopped
+    return with_examination(found, prepared.examination)
 
 
 def with_examination(found: Identification, examination: Examination) -> Identification:

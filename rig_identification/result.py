@@ -86,6 +86,15 @@ class Mismatch:
 
 
 @dataclass(frozen=True)
+class Work:
+    """What an answer took, in units of work (model/work.py): a count, the same on every machine."""
+
+    used: float
+    limit: float  # after which the search begins nothing new
+    untried: tuple[str, ...] = ()  # hypotheses that would still have been begun
+
+
+@dataclass(frozen=True)
 class Identification:
     """Everything that ``identify`` found out about a session."""
 
@@ -100,3 +109,13 @@ class Identification:
     notes: tuple[str, ...] = ()  # sentences for the report: warnings, what was left aside
     figures: dict[str, object] = field(default_factory=dict)  # numbers behind further pictures
     examination: Examination | None = None  # of the set-up, before anything was fitted; None: there was none
+    work: Work | None = None  # of the fit and the search; None: not counted
+    interrupted: bool = False  # whether the user broke the search off: the best answer until then
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user broke the search off when there was an answer already; ``answer``: the best one until then."""
+
+    def __init__(self, answer: Identification) -> None:
+        super().__init__("interrupted")
+        self.answer = answer

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,9 +22,10 @@ from rig_identification.cli.summary import summary
 from rig_identification.errors import InputError
 from rig_identification.examination import Examination
 from rig_identification.identification import Prepared
+from rig_identification.mismatch.budget import WORK
 from rig_identification.raw import RawSession
 from rig_identification.recording import Session
-from rig_identification.result import Identification
+from rig_identification.result import Identification, Interrupted, Work
 
 Install = Callable[[object], None]
 
@@ -34,8 +36,9 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
     seen: dict[str, object] = {}
 
     def install(outcome: object) -> None:
-        def identify(given: Session, *, progress: object = None) -> Identification:
+        def identify(given: Session, *, progress: object = None, work: float = 0.0) -> Identification:
             assert given is session
+            seen["work"] = work
             if isinstance(outcome, BaseException):
                 raise outcome
             return identification
@@ -68,6 +71,41 @@ def test_writes_result_and_report_and_prints_the_numbers(
     assert "warning: imu: nobody knows." in printed.out
     assert printed.out.rstrip().endswith(str(out / "report.html"))
     assert printed.err == ""
+
+
+def test_work_is_handed_on_and_told(answer: Install, tmp_path: Path) -> None:
+    answer(None)
+    assert main(["identify", "van", "--out", str(tmp_path)]) == 0
+    assert answer.seen["work"] == WORK  # type: ignore[attr-defined]
+    assert "work" not in json.loads((tmp_path / "result.json").read_text())
+    assert main(["identify", "van", "--out", str(tmp_path), "--work", "3e2"]) == 0
+    assert answer.seen["work"] == 300.0  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("text", ["0", "-3", "nan", "many"])
+def test_work_that_is_no_amount_is_refused(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["identify", "van", "--out", str(tmp_path), "--work", text])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert text in line
+    assert "units of work" in line
+
+
+def test_an_answer_that_was_broken_off_is_written_and_marked(
+    answer: Install, identification: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    work = Work(41.5, 120.0, ("tether",))
+    answer(Interrupted(replace(identification, work=work, interrupted=True)))
+    assert main(["identify", "van", "--out", str(tmp_path)]) == 130
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["interrupted"] is True
+    assert result["work"] == {"used": 41.5, "limit": 120.0, "left_untried": ["tether"]}
+    printed = capsys.readouterr()
+    assert "1240.13 ± 0.78 kg" in " ".join(printed.out.split())
+    assert len(printed.err.splitlines()) == 1
 
 
 def test_keeps_other_files_and_replaces_its_own(answer: Install, tmp_path: Path) -> None:

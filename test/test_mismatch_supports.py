@@ -65,9 +65,9 @@ def test_a_spent_budget_begins_nothing_that_changes_the_model(
         Promise(stretch, 1e6, {"cable.axial_stiffness": STIFFNESS}, 1.0),
         Promise(gain, 1e5, {}, 0.1),
     ]
-    tried = begun(problem, evaluation, promises, True, lambda stage: None, Budget(seconds=-1.0))
+    tried = begun(problem, evaluation, promises, True, lambda stage: None, Budget(0.0))
     assert [t.candidate.effect for t in tried] == ["load_cell_gain"]
-    assert supports(problem, evaluation, mass, Budget(seconds=-1.0)) == []
+    assert supports(problem, evaluation, mass, Budget(0.0)) == []
 
 
 def test_a_promise_too_far_off_is_walked_to(inextensible: tuple[Problem, Evaluation]) -> None:

@@ -105,6 +105,63 @@ def test_core_knows_no_files_no_ros_no_terminal(path: Path) -> None:
         assert not {name for name in outside if ROS.fullmatch(name)}
 
 
+#: Rooms whose answers may not depend on when they are asked, or on how fast the machine is.
+TIMELESS = {"model", "statics", "estimate", "mismatch", "search"}
+CLOCK_MODULES = {"time", "timeit", "datetime", "sched", "resource", "signal"}
+CLOCKS = re.compile(
+    r"(monotonic|perf_counter|process_time|thread_time|clock_gettime|time)(_ns)?|now|utcnow|today|getrusage"
+    r"|times|default_timer|datetime64"
+)
+
+
+def clocks_read(path: Path) -> set[str]:
+    """Modules with a clock that a file imports, and calls in it by a clock's name."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = {name for name in imported(path) if name.split(".")[0] in CLOCK_MODULES}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            named = node.func
+            called = named.attr if isinstance(named, ast.Attribute) else getattr(named, "id", "")
+            if CLOCKS.fullmatch(called):
+                found.add(called)
+            # What is imported by a name in quotes
+            found |= {
+                str(a.value)
+                for a in node.args
+                if called in {"__import__", "import_module"}
+                and isinstance(a, ast.Constant)
+                and str(a.value).split(".")[0] in CLOCK_MODULES
+            }
+    return found
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in modules() if room(p) in TIMELESS], ids=lambda path: str(path.relative_to(PACKAGE))
+)
+def test_an_answer_asks_no_clock(path: Path) -> None:
+    assert not clocks_read(path)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import time as t\nt.monotonic()",
+        "def f():\n    from time import perf_counter as p",
+        "import numpy as np\nnp.datetime64('now')",
+        "import os\nos.times()",
+        "clock = __import__('time')",
+        "def late(self):\n    return self.clock.monotonic_ns() > self.end",
+    ],
+)
+def test_a_clock_is_seen(source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / NAME
+    (package / "model").mkdir(parents=True)
+    file = package / "model" / "body.py"
+    file.write_text(source)
+    monkeypatch.setattr(sys.modules[__name__], "PACKAGE", package)
+    assert clocks_read(file)
+
+
 def test_the_walk_sees_the_rooms() -> None:
     assert {"session", "report", "cli", "model"} <= {room(path) for path in modules()}
     assert "report" in rooms_imported(PACKAGE / "cli" / "summary.py")

@@ -1,6 +1,5 @@
 """The thesis' assumptions as the ideal model of a session in full physics: what was left out is found."""
 
-import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import evaluate
-from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.result import Finding
@@ -64,10 +62,7 @@ def test_a_body_less_its_rotor_moves_as_the_body_that_held_it(session):
     assert np.max(np.abs(unsettled.runs[0].residual - before.runs[0].residual)) > 10.0
 
 
-def test_what_the_thesis_left_out_is_found_and_the_inertia_comes_back(monkeypatch):
-    # What is found, and not how soon: beside another test slow cores take longer than a search may
-    module = importlib.import_module("rig_identification.search.identify")
-    monkeypatch.setattr(module, "Budget", lambda seconds: Budget(600.0))
+def test_what_the_thesis_left_out_is_found_and_the_inertia_comes_back():
     found = examine(load_case(14), 1)
     assert found.verdict == "explained"
     told = {f.effect: next(iter(f.parameters.values())) for f in found.findings}

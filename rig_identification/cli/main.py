@@ -80,8 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return UNUSABLE
     except BrokenPipeError:  # whoever read the output has seen enough
         _print_no_more()
-    except KeyboardInterrupt:
-        _say("interrupted")
+    except KeyboardInterrupt as stopped:
+        _say(str(stopped) or "interrupted")
         return INTERRUPTED
     except Exception as error:
         if arguments.debug:

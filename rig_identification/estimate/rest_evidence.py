@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.force_noise import Discrepancy
 from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.prediction import Bench, read_device
-from rig_identification.model import layout
+from rig_identification.model import layout, work
 from rig_identification.model.body import point_inertia, six_elements
 from rig_identification.model.equilibrium import Rest, find_rest, wrench_response
 from rig_identification.model.motion import RigModel, State
@@ -84,6 +84,8 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
     return RestEvidence(recording, recording.dummy, tuple(channels))
 
 
+#: What an equilibrium and its readings take (model/work.py): measured, 3 to 4 thousand.
+TAKEN = 3500
 #: What a first guess believes of a rig: cells to 0.3 %, angles to 1 mrad, accelerometers to 0.03 m/s^2.
 COARSE = {"tension": 0.003, "inclination": 1e-3, "specific_force": 0.03, "angular_rate": 1e-3}
 
@@ -137,6 +139,7 @@ def linearise_rest(
 
     discrepancy: a wrench that the model lacks, of which the body feels one draw at rest.
     """
+    work.add(TAKEN)
     parameters = bench.parameters
     model = with_dummy(parameters.model.with_physics(parameters.physics(theta)), evidence.dummy)
     rest = find_rest(model, guess, directions=parameters.directions())

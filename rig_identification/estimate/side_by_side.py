@@ -1,6 +1,7 @@
 """Tasks side by side, one a core.
 
-What takes the time holds no lock, and no task knows of another: however many cores, one result.
+What takes the time holds no lock, and no task knows of another: however many cores, one result. What a task
+computes counts as work of whoever put it there (model/work.py).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import Context, copy_context
 from typing import TypeVar
 
 Task = TypeVar("Task")
@@ -35,15 +37,17 @@ def spare() -> int:
 def side_by_side(task: Callable[[Task], Outcome], over: Iterable[Task]) -> list[Outcome]:
     """Outcome of a task for each of several things, in their order."""
 
-    def counted(item: Task) -> Outcome:
+    def counted(context: Context, item: Task) -> Outcome:
         _count(1)
         try:
-            return task(item)
+            return context.run(task, item)
         finally:
             _count(-1)
 
+    items = list(over)
     with ThreadPoolExecutor(max_workers=cores()) as pool:
-        return list(pool.map(counted, over))
+        # A context can be entered by one thread at a time: each task has a copy of its own
+        return list(pool.map(counted, [copy_context() for _ in items], items))
 
 
 def _count(change: int) -> None:

@@ -31,11 +31,12 @@ def fit_whole(
     point: Point,
     stop: Callable[[], bool] | None = None,
     curved: bool = False,
+    steps: int = STEPS,
 ) -> Fitted:
     """Fit ``whole`` from a ``point`` of the same model's fit to its ``parts``; predict the held-out runs.
 
     stop: whether to end unconverged. curved: whether the motion may answer so sharply to its noise that the
-    undisturbed one is not what happened.
+    undisturbed one is not what happened. steps: at most.
     """
     guess = (*point.rest_guesses, *point.starts)[0]
     rest = find_rest(model_at(whole.bench.parameters, point.theta), guess).state
@@ -44,8 +45,8 @@ def fit_whole(
         begun.get(run.begins) or launch_state(whole.bench, run, point.theta, rest) for run in whole.runs
     )
     begin = Point(point.theta, starts, point.rest_guesses)
-    found = _about_what_happened(whole, begin, stop) if curved else None
-    evaluation, converged = found or solve(whole, begin, iterations=STEPS, polish=POLISH, stop=stop)
+    found = _about_what_happened(whole, begin, stop, steps) if curved else None
+    evaluation, converged = found or solve(whole, begin, iterations=steps, polish=POLISH, stop=stop)
     known = (*ideal.holdout_runs, *ideal.lost)
     held_runs, held, lost = predicted(whole, known, evaluation.point.theta, rest)
     return replace(
@@ -60,7 +61,7 @@ def fit_whole(
 
 
 def _about_what_happened(
-    whole: Problem, begin: Point, stop: Callable[[], bool] | None
+    whole: Problem, begin: Point, stop: Callable[[], bool] | None, steps: int
 ) -> tuple[Evaluation, bool] | None:
     """A fit about what happened, followed anew until nothing changes; None where it cannot be followed."""
     point, found = begin, None
@@ -68,7 +69,7 @@ def _about_what_happened(
         there = followed(whole, point)
         if there is None:
             break
-        found = solve(whole, there, iterations=STEPS, stop=stop)
+        found = solve(whole, there, iterations=steps, stop=stop)
         point = found[0].point
         if found[1] or (stop is not None and stop()):
             break

@@ -36,24 +36,26 @@ from rig_identification.mismatch.push import (
 )
 from rig_identification.mismatch.screen import Promise, screen, with_reference
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
-from rig_identification.mismatch.standing import Search, short_pieces
+from rig_identification.mismatch.standing import Heard, Search, short_pieces, unheard
 from rig_identification.mismatch.trial import VERY_FAR, mass_of
 from rig_identification.mismatch.undecided import undecided
 
 Notify = Callable[[str, float], None]
 
 
-def explain(ideal: Ideal, spells: list[Spell], notify: Notify, budget: Budget) -> Explained | None:
+def explain(
+    ideal: Ideal, spells: list[Spell], notify: Notify, budget: Budget, heard: Heard = unheard
+) -> Explained | None:
     """Search for what the ideal model leaves out; None where every residual is noise.
 
     Near the noise the search looks at whole runs, which say most; where the ideal model fails by
     far, at short pieces, in which no model is far off. spells: in which a cable carries nothing (slack.py).
-    budget: how long it may take.
+    budget: how much it may compute. heard: is told what explains the session, as it is found.
     """
     if ideal.mismatch.verdict == "none":
         return _hidden(ideal, notify, budget)
     if not spells:
-        return _explain(ideal, notify, budget)
+        return _explain(ideal, notify, budget, heard=heard)
     notify("search: stretches in which every cable pulls", 0.02)
     taut = taut_ideal(ideal, spells, notify)
     if taut is None:
@@ -86,7 +88,9 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     return undecided(ideal, problem, fitted.evaluation, promises, count, notify, budget)
 
 
-def _explain(ideal: Ideal, notify: Notify, budget: Budget, *, part: bool = False) -> Explained | None:
+def _explain(
+    ideal: Ideal, notify: Notify, budget: Budget, *, part: bool = False, heard: Heard = unheard
+) -> Explained | None:
     """The search, on runs in which every cable pulls.
 
     part: these are what an event leaves of them; None then also where they are not explained.
@@ -109,7 +113,7 @@ def _explain(ideal: Ideal, notify: Notify, budget: Budget, *, part: bool = False
         pulsed = _pulsed(ideal, likeliest, promises, notify, budget)
         if pulsed is not None:
             return pulsed
-    search = Search(problem, here, evaluation, excess(evaluation), budget)
+    search = Search(problem, here, evaluation, excess(evaluation), budget, heard=heard)
     if search.whole:
         search.screened = promises
     if not search.whole:

@@ -8,7 +8,8 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.mixture import Bodies
-from rig_identification.estimate.solve import excess
+from rig_identification.estimate.solve import Problem, excess
+from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Mismatch
 
 #: Share of the ideal model's excess, and mean square beyond noise, up to which what is left is a trace: no
@@ -30,6 +31,8 @@ class Explained:
     trace: bool = False  # whether something is left at all, be it next to nothing
     bodies: Bodies = ()  # what rivals make of the body
     possible: bool = True  # whether every effect in it has an amount and a place that it can have
+    effects: tuple[Trial, ...] = ()  # of the catalogue that are in its model
+    plain: Problem | None = None  # the problem without them
 
     @property
     def told(self) -> bool:

@@ -99,7 +99,7 @@ def rival(trial: Trial, gap: float) -> dict[str, object]:
 
 
 def not_fitted(promise: Promise) -> dict[str, object]:
-    """An entry of ``alternatives``: what promised much, and time was over before it could be fitted.
+    """An entry of ``alternatives``: what promised much, and the work was done before it could be fitted.
 
     Its gap is what first order says that it would leave, and never a tie.
     """

@@ -65,7 +65,7 @@ def unexplained(ideal: Ideal, search: Search, best: Explained | None, notify: No
         kept, fitted = loose
         explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
     if search.budget.spent():
-        explanation += f" The search ended after {search.budget.seconds:.0f} s, short of "
+        explanation += f" The search ended after {search.budget.limit:g} units of work, short of "
         short = [p.candidate for p in search.waiting]
         explanation += ", ".join(called(c.effect, c.where) for c in short) or "some hypotheses"
         explanation += " and others." if short else "."

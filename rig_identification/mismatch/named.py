@@ -137,6 +137,7 @@ class _Naming:
         search.screened = None
         search.liar = search.liar or tried.liar
         search.waiting = tried.waiting if search.budget.spent() else ()
+        search.budget.leave(p.candidate.label for p in search.waiting)
         return tried
 
     def _alone(self) -> Alone:

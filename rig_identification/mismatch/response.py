@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.whitening import followed
+from rig_identification.model import work
 
 Array = NDArray[np.float64]
 
@@ -81,6 +82,8 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     N and N m about the datum, held over each node interval; where ``smooth`` they run straight from node to
     node instead, and what follows a motion is not half an interval late.
     """
+    # A third of that is this pass; what is made of its columns takes the rest (rider_places.py)
+    work.add(wrenches.shape[0] * wrenches.shape[2])
     A, B, _, _, _ = run.motion.derivatives
     out = np.empty((run.nodes.size, wrenches.shape[2]))
     held = np.ascontiguousarray(wrenches)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from rig_identification.estimate.identify import Ideal
@@ -9,6 +10,7 @@ from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.outcome import Trials
 from rig_identification.mismatch.screen import Promise, with_reference
@@ -18,6 +20,14 @@ from rig_identification.mismatch.trial import Trial, adopted
 EXPLAINED = 1.3
 #: Mean square of whole runs' residuals that refutes what short pieces agreed to.
 WRONG = 3.0
+
+
+#: Who is told what explains whole runs, as it is found.
+Heard = Callable[[Explained], None]
+
+
+def unheard(found: Explained) -> None:
+    """Nobody waits for what is found on the way."""
 
 
 @dataclass
@@ -33,9 +43,10 @@ class Search:
     found: list[Trial] = field(default_factory=list)
     rivals: list[dict[str, object]] = field(default_factory=list)
     bodies: Bodies = ()  # what rivals of the last one found make of the body, where whole runs say so
-    waiting: tuple[Promise, ...] = ()  # what promised most of what was not fitted before time was over
+    waiting: tuple[Promise, ...] = ()  # what promised most of what was not fitted before the work was done
     liar: str | None = None
     screened: list[Promise] | None = None  # promises about ``evaluation``, where they are known
+    heard: Heard = unheard  # is told what explains whole runs, as it is found
 
     @property
     def whole(self) -> bool:

@@ -39,6 +39,8 @@ Stop = Callable[[], bool]
 ABSURD = 3.0
 #: Std by which an amount has to lie clear of none.
 PLAIN = 3.0
+#: Half-width of a normal distribution's 95 % interval, in std.
+NORMAL_95 = 1.96
 #: Steps of a first, short fit (more where the model itself changes) and of one to the end.
 FIRST_STEPS = 4
 CHANGED_STEPS = 7
@@ -480,6 +482,19 @@ def amount_seen(trial: Trial) -> bool:
     amounts = candidate.parameters[candidate.positive :][: candidate.either_way]
     seen = in_stds(trial) if amounts else {}
     return max([*signs(trial), *(abs(seen[p.name]) for p in amounts)], default=PLAIN) >= PLAIN
+
+
+def may_be_none(trial: Trial) -> bool:
+    """Whether the 95 % interval of every amount includes none; all numbers count where none is an amount.
+
+    A number that is a ratio is never none.
+    """
+    free = {p.name: p for p in trial.problem.bench.parameters.free}
+    own, seen = trial.candidate.parameters, in_stds(trial)
+    amounts = own[: trial.candidate.positive + trial.candidate.either_way] or own
+    if any(free[p.name].ratio for p in amounts):
+        return False
+    return all(abs(seen[p.name]) < NORMAL_95 for p in amounts)
 
 
 def in_stds(trial: Trial) -> dict[str, float]:

@@ -18,7 +18,14 @@ from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.standing import Search
-from rig_identification.mismatch.trial import Trial, beyond_doubt, ordinary_errors, possible, strength
+from rig_identification.mismatch.trial import (
+    Trial,
+    beyond_doubt,
+    may_be_none,
+    ordinary_errors,
+    possible,
+    strength,
+)
 from rig_identification.result import Finding, Mismatch
 
 #: Gain, in parts of what chance gives, above which it is not tried whether the rest does without an effect.
@@ -77,7 +84,12 @@ def fitted_whole(
         told = "unexplained"
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
     mismatch = Mismatch(told, text, findings, tuple(search.rivals))
-    return Explained(fitted, mismatch, ideal, loose, trace, search.bodies, can_be)
+    outcome = Explained(
+        fitted, mismatch, ideal, loose, trace, search.bodies, can_be, tuple(found), search.problem
+    )
+    if outcome.told:
+        search.heard(outcome)
+    return outcome
 
 
 def strayed(fitted: Fitted) -> bool:
@@ -118,18 +130,23 @@ def firmness(trial: Trial, ordinary: dict[str, float], count: int) -> float:
 
 
 def pruned(best: Explained, search: Search, count: int) -> Explained:
-    """The explanation less what it can do without: an early effect may only have stood in for a later one."""
+    """The explanation less what it can do without: an early effect may only have stood in for a later one.
+
+    What may as well be none goes first, and goes too where a trace is left without it.
+    """
     kept = list(search.found)
     ordinary = ordinary_errors(search.problem)
     while len(kept) > 1:
         fitted = best.fitted
-        strengths = [firmness(as_fitted(fitted, t), ordinary, count) for t in kept]
+        here = [as_fitted(fitted, t) for t in kept]
+        none = [may_be_none(t) for t in here]
+        strengths = [-1.0 if n else firmness(t, ordinary, count) for t, n in zip(here, none, strict=True)]
         for i in np.argsort(strengths):
             if strengths[i] > FIRM:
                 return best
             less = [t for k, t in enumerate(kept) if k != i]
             again = fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
-            if again.told and (best.trace or not again.trace):
+            if again.told and (none[i] or best.trace or not again.trace):
                 # What leaves a trace that both together do not leave lacks something
                 best, kept = again, less
                 break

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.model import layout
+from rig_identification.model import layout, work
 from rig_identification.model.body import linear_from_elements
 from rig_identification.model.constraints import project_columns, project_state
 from rig_identification.model.effects.place import (
@@ -243,6 +243,8 @@ WORTHWHILE = 200
 #: What a node costs without derivatives, as a share of one with those in state and wrench alone, and what
 #: each direction adds to the latter (measured: bench/forward_model.py).
 PLAIN_SHARE, DIRECTION_SHARE = 0.3, 0.03
+#: ... and in columns (model/work.py).
+PLAIN_WORK = 9
 
 
 def simulate(
@@ -279,6 +281,8 @@ def simulate(
     kept = _Kept.of(nodes, model, chosen.size, sensitivity)
     done = walk.stretches(x, R, cuts, kept)
     if not sensitivity:
+        # What derivatives take is counted by whoever asks for them, with what is made of them
+        work.add(done * substeps * PLAIN_WORK)
         return Motion(drive.step, kept.states, kept.R_world_body, kept.outputs, done)
     J = accumulate(columns, kept.A, kept.C, kept.H, kept.P)
     return Motion(

@@ -110,7 +110,7 @@ def _alternative(alternative: Mapping[str, object]) -> AlternativeView:
         name, value, half, unit = _parameter(*next(iter(parameters.items())))
         amount = f"{name} {value} ± {half} {unit}" if half else f"{name} {value} {unit}"
     elif alternative.get("fitted") is False:
-        amount = "not fitted: time was over"
+        amount = "not fitted: the work was done"
     elif alternative.get("statement"):
         amount = str(alternative["statement"])
     return AlternativeView(

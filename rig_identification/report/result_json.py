@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig_identification.report.examination_json import check_part
 from rig_identification.report.plain import plain
-from rig_identification.result import ELEMENTS, Finding, Identification, InertialEstimate, Mismatch
+from rig_identification.result import ELEMENTS, Finding, Identification, InertialEstimate, Mismatch, Work
 
 #: Index into the ten elements of each entry of the inertia tensor.
 INERTIA_INDEX = ((4, 5, 6), (5, 7, 8), (6, 8, 9))
@@ -27,7 +27,8 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         ``without_frame`` is None where no frame was described. Where effects were found,
         ``mismatch`` holds one key more, ``ideal_model``: mass, centre of mass, inertia and what is
         unobservable as the ideal model alone has them. Where the session was examined, ``check`` holds
-        what was found before anything was fitted.
+        what was found before anything was fitted. ``work`` says what the answer took, where it was counted,
+        and ``interrupted`` is there, and true, where the user broke the search off.
     """
     total = identification.total
     without_frame = identification.without_frame
@@ -40,6 +41,8 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
             **_mismatch(identification.mismatch),
             **_ideal_model(identification.figures.get("ideal")),
         },
+        **_work(identification.work),
+        **({"interrupted": True} if identification.interrupted else {}),
         **({} if identification.examination is None else {"check": check_part(identification.examination)}),
     }
 
@@ -80,6 +83,12 @@ def _mismatch(mismatch: Mismatch) -> dict[str, object]:
         "findings": [_finding(finding) for finding in mismatch.findings],
         "alternatives": plain(mismatch.alternatives),
     }
+
+
+def _work(work: Work | None) -> dict[str, object]:
+    if work is None:
+        return {}
+    return {"work": plain({"used": work.used, "limit": work.limit, "left_untried": list(work.untried)})}
 
 
 def _finding(finding: Finding) -> dict[str, object]:

@@ -6,7 +6,7 @@ instead: a hose its displacement, a damper its velocity, a liquid its accelerati
 inertia can stand for does not average out.
 
 So the wrench w of the fitted model, which is known (search/path.py), is believed to be
-    w(t) = sum_j c_j u_j(t) + noise,    u: acceleration, velocity and displacement of the body (6 each), and 1,
+    w(t) = sum_j c_j u_j(t) + noise,    u: the body's acceleration, velocity, displacement (6 each), and 1,
 with c_ij normal of zero mean and a variance of rms(w_i)^2 / rms(u_j)^2: any of the 19 may make all of it. The
 recordings tell the c_ij as far as they can: their columns stand beside those of the model (Gauss and Markov).
 Integrated out they widen the body's covariance by K S^-1 K', and would move it by K c; whether they do is not
@@ -54,11 +54,16 @@ def with_what_follows(problem: Problem, evaluation: Evaluation) -> InertialEstim
     runs, rests = _columns(evaluation)
     columns = beyond.of(runs, rests)
     left = columns.information([*runs, *rests]) + np.eye(columns.right.size)
-    bends = problem.bench.parameters.elements_jacobian(evaluation.point.theta) @ (
-        beyond.bent_by(columns)[:INERTIAL]
+    bends = (
+        problem.bench.parameters.elements_jacobian(evaluation.point.theta)
+        @ (beyond.bent_by(columns)[:INERTIAL])
     )
     shift = bends @ np.linalg.solve(left, columns.right)
-    covariance = coherence(problem, evaluation) * plain.covariance + bends @ np.linalg.solve(left, bends.T) + np.outer(shift, shift)
+    covariance = (
+        coherence(problem, evaluation) * plain.covariance
+        + bends @ np.linalg.solve(left, bends.T)
+        + np.outer(shift, shift)
+    )
     std = np.sqrt(np.diag(covariance))
     vague = {name for name, s, b in zip(ELEMENTS, std, believed_std(problem), strict=True) if s > GAIN * b}
     lost = with_products({*plain.unobservable, *vague})

@@ -26,7 +26,7 @@ from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.without_frame import subtract_frame
-from rig_identification.mismatch.budget import SECONDS, Budget
+from rig_identification.mismatch.budget import WORK, Budget
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
@@ -34,9 +34,11 @@ from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.stretched_at_first import with_stretch_told
 from rig_identification.mismatch.watched import Watched, explain_watched
+from rig_identification.model.work import counted
 from rig_identification.recording import Session
-from rig_identification.result import Identification
+from rig_identification.result import Identification, Interrupted
 from rig_identification.search.search import search
+from rig_identification.search.so_far import SoFar, accounted, interrupted
 
 Progress = Callable[[str, float], None]
 
@@ -48,15 +50,21 @@ def identify(
     session: Session,
     progress: Progress | None = None,
     assumed: Assumed | None = None,
-    seconds: float = SECONDS,
+    work: float | None = None,
 ) -> Identification:
     """Mass, centre of mass and inertia tensor, with whatever the ideal model leaves out found and modelled.
 
-    assumed: what another ideal model than this project's assumes, the thesis' for one. seconds: after which
-    the search for what is left out begins nothing new (budget.py).
+    assumed: what another ideal model than this project's assumes, the thesis' for one. work: units of work
+    after which the search for what is left out begins nothing new; None: as many as budget.py has.
     ``figures["ideal"]`` of the result holds the ideal model's own answer where effects were found.
 
-    Raises InputError where the session holds nothing to fit.
+    Raises
+    ------
+    InputError
+        The session holds nothing to fit.
+    Interrupted
+        The user broke the search off; it holds the best answer until then. KeyboardInterrupt where there is
+        none yet.
     """
 
     def notify(stage: str, fraction: float) -> None:
@@ -67,17 +75,23 @@ def identify(
     session = session if origins.given else moved(session, origins)
     lines = lines_at_rest(session)
     session = without_lines(session, lines)
-    try:
-        found = _driven(session, notify, assumed, seconds)
-    except CannotBeFollowed as why:
-        found = unanswered(session, why)
-    found = replace(found, mismatch=with_lines(with_overranges(found.mismatch, session), lines))
-    return found if origins.given else told(found, origins)
+
+    def ended(found: Identification) -> Identification:
+        found = replace(found, mismatch=with_lines(with_overranges(found.mismatch, session), lines))
+        return found if origins.given else told(found, origins)
+
+    with counted():
+        try:
+            return ended(_driven(session, notify, assumed, WORK if work is None else work))
+        except CannotBeFollowed as why:
+            return ended(unanswered(session, why))
+        except Interrupted as stopped:
+            raise Interrupted(ended(stopped.answer)) from stopped
 
 
-def _driven(session: Session, notify: Progress, assumed: Assumed | None, seconds: float) -> Identification:
+def _driven(session: Session, notify: Progress, assumed: Assumed | None, work: float) -> Identification:
     """The answer to a session, without the runs that a force drives which was not recorded."""
-    found, ideal = _identified(session, notify, assumed, seconds)
+    found, ideal = _identified(session, notify, assumed, work)
     less = None
     if found.mismatch.verdict == "unexplained" and all(
         f.effect == "unknown" for f in found.mismatch.findings
@@ -85,7 +99,10 @@ def _driven(session: Session, notify: Progress, assumed: Assumed | None, seconds
         # An exciter whose topic is missing may have been off: only where nothing else is found was it not
         less = without_unseen_force(session, ideal, lambda run: True)
     if less is not None:
-        rest, _ = _identified(less.session, notify, assumed, seconds)
+        try:
+            rest, _ = _identified(less.session, notify, assumed, work)
+        except KeyboardInterrupt as stopped:
+            raise Interrupted(interrupted(found)) from stopped
         found = _without_unseen(found, rest, less.note)
     return with_stretch_told(found, ideal)
 
@@ -122,10 +139,11 @@ def _worth_a_search(watched: Watched) -> bool:
     return watched.mismatch.verdict == "unexplained" and misfit(watched.fitted.evaluation) < HOPELESS_SQUARE
 
 
-def _followed(ideal: Ideal, notify: Progress, budget: Budget) -> Explained | None:
+def _followed(so_far: SoFar, notify: Progress) -> Explained | None:
     """What explains the session with a random wrench on the way; None where nothing does, or no fit holds."""
     try:
-        return search(ideal, notify, budget)[0]
+        found, so_far.rung = search(so_far.ideal, notify, so_far.budget, so_far.hear)
+        return found
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 
@@ -136,68 +154,74 @@ def _answered(ideal: Ideal, found: Explained | None) -> bool:
     return verdict != "unexplained"
 
 
-def _answer_with(found: Explained, session: Session, plain: Identification) -> Identification:
-    """The answer with what was found in the model. plain: the ideal model's."""
-    careful = None if found.told else found.ideal.careful
-    answer = compose(
-        session, found.fitted, scores(found.fitted), found.mismatch, careful, found.loose, found.bodies
-    )
-    return replace(answer, figures={**answer.figures, "ideal": plain})
-
-
 def _identified(
-    session: Session, notify: Progress, assumed: Assumed | None, seconds: float
+    session: Session, notify: Progress, assumed: Assumed | None, work: float
 ) -> tuple[Identification, Fitted]:
-    """The answer to a session, and the ideal model's fit."""
-
-    def searching(stage: str, fraction: float) -> None:
-        notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
+    """The answer to a session, and the ideal model's fit. Raises Interrupted once there is an answer."""
 
     def fitting(stage: str, fraction: float) -> None:
         notify(stage, IDEAL_SHARE * fraction)
 
-    budget = Budget(seconds)
+    budget = Budget(work)
     fitted = fit_session(session, fitting, assumed)
-    ideal = Ideal(fitted, *judged(fitted))
+    so_far = SoFar(session, Ideal(fitted, *judged(fitted)), budget)
+    try:
+        return accounted(so_far.widened(_searched(so_far, notify)), budget), fitted
+    except KeyboardInterrupt as stopped:
+        raise Interrupted(so_far.interrupted()) from stopped
+
+
+def _searched(so_far: SoFar, notify: Progress) -> Identification:
+    """The answer to a session whose ideal model is fitted."""
+
+    def searching(stage: str, fraction: float) -> None:
+        notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
+
+    session, ideal, budget = so_far.session, so_far.ideal, so_far.budget
+    fitted = ideal.fitted
     spells, named = spells_of(fitted), None
     # What is only watched tells no wrench, and through a slack spell none goes on
     followed = bool(fitted.problem.runs) and not spells and not only_watched(fitted.problem)
     if not spells and not near_noise(fitted):
         if followed:
             # Where much is left a model follows the data with a discrepancy, and none has to by itself
-            named = _followed(ideal, searching, budget)
+            named = _followed(so_far, searching)
             if named is not None and named.wholly:
-                plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
-                return _answer_with(named, session, plain), fitted
-        ideal = with_pieces(ideal, fitting)
-    plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, None)
+                return so_far.with_findings(named, _plain(so_far))
+        ideal = so_far.ideal = with_pieces(ideal, searching)
+    plain = _plain(so_far)
     swinging = None
     if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
-        ideal = with_pieces(ideal, searching)
+        ideal = so_far.ideal = with_pieces(ideal, searching)
         watched = _watched(ideal, searching)
         if watched is not None:
-            swinging = _answer_of(watched, session, plain)
+            swinging = so_far.swinging = _answer_of(watched, session, plain)
             if not _worth_a_search(watched):
-                return swinging, fitted
+                return swinging
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
-            found = explain(ideal, spells, searching, budget)
+            found = explain(ideal, spells, searching, budget, so_far.hear)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
     if swinging is not None and (found is None or not (found.told or found.mismatch.verdict == "none")):
-        return swinging, fitted
+        return swinging
     if followed and near_noise(fitted) and not _answered(ideal, found):
-        named = _followed(ideal, searching, budget)
+        named = _followed(so_far, searching)
     if named is not None and not _answered(ideal, found):
-        return _answer_with(named, session, plain), fitted
+        return so_far.with_findings(named, plain)
     if found is None:
-        ideal = with_pieces(ideal, searching)
+        ideal = so_far.ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
-        return (plain if note is None else replace(plain, notes=(*plain.notes, note))), fitted
+        return plain if note is None else replace(plain, notes=(*plain.notes, note))
     if found.mismatch.verdict == "none":
-        stated = compose(
+        return compose(
             session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies
         )
-        return stated, fitted
-    return _answer_with(found, session, plain), fitted
+    return so_far.with_findings(found, plain)
+
+
+def _plain(so_far: SoFar) -> Identification:
+    """What the ideal model alone makes of the session."""
+    ideal = so_far.ideal
+    return compose(so_far.session, ideal.fitted, ideal.scores, ideal.mismatch, None)

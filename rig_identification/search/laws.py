@@ -33,9 +33,7 @@ def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
         return found
     others = tuple(t.candidate for t in found if t is not law)
     less = made_sparse(extended(problem, others), law, budget)
-    return [
-        replace(less if t is law else t, problem=less.problem, evaluation=less.evaluation) for t in found
-    ]
+    return [replace(less if t is law else t, problem=less.problem, evaluation=less.evaluation) for t in found]
 
 
 def in_words(best: Explained, found: list[Trial]) -> Explained:

@@ -20,7 +20,7 @@ from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import catalogue, compatible, count_of, net_gain
 from rig_identification.mismatch.one_more import one_more
 from rig_identification.mismatch.screen import Promise, carried, extended, screen, with_reference
-from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.standing import Heard, Search, unheard
 from rig_identification.mismatch.trial import Trial, mass_of, promised
 from rig_identification.mismatch.whole_runs import fitted_whole, pruned
 from rig_identification.model.motion import State
@@ -54,8 +54,15 @@ class Standing:
     found: tuple[Candidate, ...] = ()
 
 
-def search(ideal: Ideal, notify: Notify, budget: Budget) -> tuple[Explained | None, Rung | None]:
-    """What explains the session, but for a trace perhaps, None where nothing does; and the last model."""
+def search(
+    ideal: Ideal, notify: Notify, budget: Budget, heard: Heard = unheard
+) -> tuple[Explained | None, Rung | None]:
+    """What explains the session, but for a trace perhaps, None where nothing does; and the last model.
+
+    budget: how much it may compute. heard: is told what explains the session, as it is found.
+    """
+    if budget.spent():
+        return None, None
     fitted = ideal.fitted
     problem = with_reference(replace(fitted.problem, discrepancy=None), fitted.rest)
     notify("search: the motion as recorded", 0.05)
@@ -66,25 +73,23 @@ def search(ideal: Ideal, notify: Notify, budget: Budget) -> tuple[Explained | No
     candidates = catalogue(problem)
     standing, best_told = Standing(first), None
     for step in range(MOST_EFFECTS):
+        if budget.spent():
+            break
 
         def say(label: str, step: int = step) -> None:
             notify(f"search: {label}", (step + 0.5) / (MOST_EFFECTS + 1))
 
-        children = _children(standing, candidates, say, budget)
+        children = _children(standing, candidates, budget, say)
         if not children:
             break
         best = children[0]
         if best.rung.evidence < standing.rung.evidence + NEEDED + np.log(count_of(candidates)):
             break
-        weaker = best.rung.level > standing.rung.level or standing.rung.alone
         standing = best
-        if not weaker:
-            # What is left out takes the wrench's place: this stands in for a part of it
-            break
         if standing.rung.level < NEARLY_ALONE:
             continue
         say("whole runs with " + ", ".join(c.label for c in standing.found))
-        told = _whole(ideal, problem, standing, children[1:], candidates, notify, budget)
+        told = _whole(ideal, problem, standing, children[1:], candidates, notify, budget, heard)
         if told is not None and told.wholly:
             return told, standing.rung
         if told is not None and told.told:
@@ -93,7 +98,7 @@ def search(ideal: Ideal, notify: Notify, budget: Budget) -> tuple[Explained | No
 
 
 def _children(
-    standing: Standing, candidates: list[Candidate], say: Callable[[str], None], budget: Budget
+    standing: Standing, candidates: list[Candidate], budget: Budget, say: Callable[[str], None]
 ) -> list[Standing]:
     """Models with one more effect, each at its own level, likeliest first.
 
@@ -105,8 +110,10 @@ def _children(
     promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
     promises += promised_laws(rung, standing.found)
     first: list[Standing] = []
-    for candidate, values in _with_twins(worthy(promises, count_of(candidates))):
+    asked = list(_with_twins(worthy(promises, count_of(candidates))))
+    for k, (candidate, values) in enumerate(asked):
         if budget.spent():
+            budget.leave(c.label for c, _ in asked[k:])
             break
         say(candidate.label)
         wide, point = _with(rung, candidate, values)
@@ -198,6 +205,7 @@ def _whole(
     candidates: list[Candidate],
     notify: Notify,
     budget: Budget,
+    heard: Heard,
 ) -> Explained | None:
     """Whole runs with what was found, judged on held-out ones; beside it what explains them as well."""
     rung = standing.rung
@@ -218,6 +226,7 @@ def _whole(
         found=found,
         rivals=[rival(trial, gap) for gap, trial in rivals],
         bodies=tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in rivals),
+        heard=heard,
     )
     best = _alone(ideal, search_, candidates, standing, notify)
     return None if best is None else in_words(best, found)

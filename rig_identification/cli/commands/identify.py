@@ -1,12 +1,14 @@
 """Estimate mass, centre of mass and inertia from a recorded session.
 
 The set-up is checked first, as ``check`` does: what is certain is corrected and told as a finding.
-Writes DIR/result.json and DIR/report.html, both or neither.
+Writes DIR/result.json and DIR/report.html, both or neither. Interrupted (Ctrl-C) once the ideal model is
+fitted it writes the best answer until then, marked as interrupted; the exit status is then 130.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,8 +16,9 @@ from pathlib import Path
 from rig_identification.cli.output import check_output_folder, write_together
 from rig_identification.cli.progress import StageProgress
 from rig_identification.cli.session_options import add_session_options, read_recorded, watched
+from rig_identification.mismatch.budget import WORK
 from rig_identification.recording import Session
-from rig_identification.result import Identification
+from rig_identification.result import Identification, Interrupted
 
 RESULT, REPORT = "result.json", "report.html"
 
@@ -24,11 +27,32 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Take the session, where to write, and what its topics are called."""
     add_session_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for result and report")
+    parser.add_argument(
+        "--work",
+        type=_units,
+        default=WORK,
+        metavar="UNITS",
+        help="after so many units of work the search for what the ideal model leaves out begins nothing new; "
+        f"default {WORK:g}, about two minutes of two cores",
+    )
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Read, identify, write, and print the ten numbers."""
-    identify_session(arguments.session, arguments.out, arguments.namespace, dict(arguments.topic))
+    identify_session(
+        arguments.session, arguments.out, arguments.namespace, dict(arguments.topic), arguments.work
+    )
+
+
+def _units(text: str) -> float:
+    """A number of units of work above none."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0; give units of work")
+    return value
 
 
 def identify_session(
@@ -37,6 +61,7 @@ def identify_session(
     namespace: str = "/rig",
     topics: dict[str, str] | None = None,
     remark: Callable[[Identification], str] | None = None,
+    work: float = WORK,
 ) -> None:
     """Identify the session at ``path`` into the folder ``out`` and print the ten numbers.
 
@@ -46,6 +71,9 @@ def identify_session(
     ------
     InputError
         The session or the folder cannot be used; the folder is as it was.
+    KeyboardInterrupt
+        The user broke it off. Once the ideal model is fitted, the best answer until then is written and
+        printed, marked as interrupted; before, the folder is as it was.
     """
     from rig_identification.identification import identify_prepared, prepare
 
@@ -53,10 +81,15 @@ def identify_session(
     with StageProgress(sys.stderr) as progress:
         raw = read_recorded(path, namespace, topics or {}, progress)
         prepared = prepare(raw, watched(progress))
-        identification = identify_prepared(prepared, progress)
+        try:
+            identification = identify_prepared(prepared, progress, work)
+        except Interrupted as stopped:
+            identification = stopped.answer
         progress("writing the report")
         _write(identification, prepared.session, out)
     _print(identification, out, remark)
+    if identification.interrupted:
+        raise KeyboardInterrupt("interrupted: result and report hold the best answer until then")
 
 
 def _write(identification: Identification, session: Session, out: Path) -> None:

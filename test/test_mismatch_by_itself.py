@@ -1,0 +1,121 @@
+"""Each of several findings bears its own evidence: what is lost when it alone is taken out of the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_simulate_identify import shaken
+
+from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.estimate.solve import excess, solve
+from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.screen import carried, extended, with_reference
+from rig_identification.mismatch.standing import Search
+from rig_identification.mismatch.trial import Trial, may_be_none
+from rig_identification.mismatch.whole_runs import as_fitted, fitted_whole, pruned
+from rig_identification.recording import Recording
+from rig_identification.simulate import simulate_session
+
+#: Turn of the inclinometer about y, rad, and what every hinge resists, N m s/rad.
+TURNED, DAMPING = 0.01, 40.0
+
+
+def _turned(recording: Recording) -> Recording:
+    inclination = recording.inclination
+    assert inclination is not None
+    return replace(
+        recording, inclination=replace(inclination, values=inclination.values + np.array([0.0, TURNED]))
+    )
+
+
+@pytest.fixture(scope="module")
+def ideal() -> Ideal:
+    spec = shaken(10)
+    (run,) = spec.runs
+    held = replace(run, name="run_2", holdout=True)
+    spec = replace(spec, runs=(run, held), effects={"hinge_damping": (DAMPING,)}, doubts=False)
+    session, _ = simulate_session(spec, np.random.default_rng(5))
+    fitted = fit_session(replace(session, recordings=tuple(_turned(r) for r in session.recordings)))
+    return Ideal(fitted, *judged(fitted))
+
+
+def _with(ideal: Ideal, labels: list[str]) -> tuple[Explained, Search]:
+    """Whole runs with some effects of the catalogue."""
+    fitted = ideal.fitted
+    problem = with_reference(fitted.problem, fitted.rest)
+    known = {c.label: c for c in catalogue(problem)}
+    chosen: list[Candidate] = [known[label] for label in labels]
+    here = extended(problem, tuple(chosen))
+    point = carried(here, problem, fitted.evaluation.point)
+    search = Search(problem, here, fitted.evaluation, excess(fitted.evaluation), UNLIMITED)
+    search.found = [Trial(c, here, fitted.evaluation, 0.0) for c in chosen]
+    return fitted_whole(ideal, search, search.found, here, point), search
+
+
+@pytest.fixture(scope="module")
+def both(ideal: Ideal) -> Explained:
+    return _with(ideal, ["inclinometer_offset inclinometer y", "hinge_damping"])[0]
+
+
+def never() -> bool:
+    return False
+
+
+def test_each_is_worth_what_a_model_without_it_lacks(ideal: Ideal, both: Explained) -> None:
+    assert both.wholly
+    together = float(ideal.fitted.evaluation.cost - both.fitted.evaluation.cost)
+    findings = each_by_itself(both, never).mismatch.findings
+    assert {f.effect for f in findings} == {"inclinometer_offset", "hinge_damping"}
+    for trial in both.effects:
+        (told,) = (f for f in findings if f.effect == trial.candidate.effect)
+        gain, before = told.evidence["log_likelihood_gain"], told.evidence["holdout_error_before"]
+        (other,) = (t.candidate for t in both.effects if t is not trial)
+        less = extended(with_reference(ideal.fitted.problem, ideal.fitted.rest), (other,))
+        point = carried(less, both.fitted.problem, both.fitted.evaluation.point)
+        ended, converged = solve(less, point, iterations=40)
+        assert converged
+        true = ended.cost - both.fitted.evaluation.cost
+        assert gain is not None
+        assert true - 0.5 < gain < 1.05 * true + 1.0
+        assert gain < together
+        after = told.evidence["holdout_error_after"]
+        assert before is not None
+        assert after is not None
+        assert after < before
+
+
+def test_the_two_differ(both: Explained) -> None:
+    gains = [f.evidence["log_likelihood_gain"] for f in each_by_itself(both, never).mismatch.findings]
+    assert gains[0] != gains[1]
+
+
+def test_one_alone_is_worth_what_it_gains_over_the_ideal_model(ideal: Ideal) -> None:
+    alone, _ = _with(ideal, ["hinge_damping"])
+    (told,) = each_by_itself(alone, never).mismatch.findings
+    gain = ideal.fitted.evaluation.cost - alone.fitted.evaluation.cost
+    assert told.evidence["log_likelihood_gain"] == pytest.approx(gain)
+
+
+def test_what_may_as_well_be_none_is_no_finding(ideal: Ideal) -> None:
+    labels = ["inclinometer_offset inclinometer y", "hinge_damping", "hinge_friction"]
+    three, search = _with(ideal, labels)
+    rubbing = next(t for t in three.effects if t.candidate.effect == "hinge_friction")
+    assert may_be_none(as_fitted(three.fitted, rubbing))
+    told = {"inclinometer_offset", "hinge_damping"}
+    assert {f.effect for f in three.mismatch.findings} == told | {"hinge_friction"}
+    assert {f.effect for f in each_by_itself(three, never).mismatch.findings} == told
+    assert {f.effect for f in pruned(three, search, 100).mismatch.findings} == told
+
+
+def test_without_time_no_gain_is_told(both: Explained) -> None:
+    for found in (not_weighed(both), each_by_itself(both, lambda: True)):
+        assert len(found.mismatch.findings) == 2
+        for told in found.mismatch.findings:
+            assert told.evidence["log_likelihood_gain"] is None
+            assert told.evidence["holdout_error_after"] is not None
