@@ -25,7 +25,7 @@ from rig_identification.estimate.solve import (
 )
 from rig_identification.mismatch.trial import log_evidence
 from rig_identification.search.levels import ALONE, at_level
-from rig_identification.search.path import followed, found_from
+from rig_identification.search.path import beside, followed, found_from
 
 #: Gain (nats) that a step has to promise: less does not tell models apart.
 WORTH = 2.0
@@ -144,7 +144,8 @@ def _followed(problem: Problem, point: Point) -> Evaluation | None:
 def _paying(problem: Problem, current: Evaluation, step: np.ndarray) -> Evaluation | None:
     """As much of a step as pays, with each run's wrench smoothed again; None where nothing of it does."""
     for part in SHORTER:
-        there = followed(problem, moved_by(problem, current, part * step))
+        moved = moved_by(problem, current, part * step)
+        there = followed(problem, beside(problem, moved, problem, current))
         new = None if there is None else evaluate(problem, there)
         if new is not None and new.cost < current.cost + JITTER:
             return new

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.prediction import Linearised, model_at, smoothed, start_basis
+from rig_identification.estimate.prediction import Linearised, drive, model_at, smoothed, start_basis
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, shortened
+from rig_identification.model.inverse import kept_in_motion
 from rig_identification.model.motion import RigModel, State, on_cables
 
 Array = NDArray[np.float64]
@@ -61,6 +62,22 @@ def found_from(problem: Problem, point: Point) -> Point | None:
         if found is None or end >= whole:
             return found
         point, end = found, 2.0 * end
+
+
+def beside(problem: Problem, point: Point, wide: Problem, there: Evaluation) -> Point:
+    """The ``point`` of a ``wide`` problem with the wrenches under which its model moves as ``there``.
+
+    problem: of ``there``. An effect that enters with all of its amount acts beside wrenches that stood in for
+    it; without this the motion is lost within seconds.
+    """
+    old = model_at(problem.bench.parameters, there.point.theta)
+    new = model_at(wide.bench.parameters, point.theta)
+    latents = []
+    for run, linearised in zip(problem.runs, there.runs, strict=True):
+        driven = drive(run, problem.bench.parameters, there.point.theta)
+        driven = replace(driven, wrench=driven.wrench + linearised.latent)
+        latents.append(kept_in_motion(old, linearised.motion, driven, new))
+    return replace(point, latents=tuple(latents))
 
 
 def _until_it_stays(part: Problem, point: Point) -> Point | None:

@@ -27,6 +27,7 @@ from rig_identification.model.motion import State
 from rig_identification.search.ladder import Rung, begun, fitted_at, walked_down
 from rig_identification.search.laws import in_words, promised_laws, sparse
 from rig_identification.search.levels import ALONE
+from rig_identification.search.path import beside
 
 Notify = Callable[[str, float], None]
 
@@ -163,7 +164,8 @@ def _with(rung: Rung, candidate: Candidate, values: dict[str, float]) -> tuple[P
     """The model with one more effect, started at ``values``."""
     wide = extended(rung.problem, (candidate,))
     point = carried(wide, rung.problem, rung.evaluation.point)
-    return wide, promised(wide, point, candidate, values, rung.evaluation)
+    point = promised(wide, point, candidate, values, rung.evaluation)
+    return wide, beside(rung.problem, point, wide, rung.evaluation)
 
 
 def _closer(parent: Rung, standing: Standing, say: Callable[[str], None]) -> Iterator[Standing]:
