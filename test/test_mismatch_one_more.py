@@ -47,11 +47,12 @@ def test_air_beside_a_turned_inclinometer_is_told(both: tuple[Identification, np
 
 
 def test_each_of_them_bears_its_own_evidence(both: tuple[Identification, np.ndarray]) -> None:
-    """Without the turn all is contradicted; without the air nothing is, and a few nats are lost."""
+    """Without the turn all is contradicted; without the air no residual shows it, and less is lost."""
     turn, air = (f.evidence["log_likelihood_gain"] for f in both[0].mismatch.findings)
     assert turn is not None
     assert air is not None
-    assert turn > 100.0 > air > 5.0
+    assert turn > 2.0 * air
+    assert air > 5.0
 
 
 @pytest.mark.long
