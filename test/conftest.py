@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 # As the command does (cli/main.py), before anything imports numpy: two workers whose linear algebra shares
-# the cores among itself take half as long again, and an answer whose time is over says less.
+# the cores among itself take half as long again.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np

@@ -46,6 +46,15 @@ def test_air_beside_a_turned_inclinometer_is_told(both: tuple[Identification, np
     assert np.max(np.abs(deviation)) < 3.5
 
 
+def test_each_of_them_bears_its_own_evidence(both: tuple[Identification, np.ndarray]) -> None:
+    """Without the turn all is contradicted; without the air no residual shows it, and less is lost."""
+    turn, air = (f.evidence["log_likelihood_gain"] for f in both[0].mismatch.findings)
+    assert turn is not None
+    assert air is not None
+    assert turn > 2.0 * air
+    assert air > 5.0
+
+
 @pytest.mark.long
 def test_where_there_is_no_air_none_is_told_and_the_interval_has_cables_in_it() -> None:
     found, deviation = _answer(0.0)

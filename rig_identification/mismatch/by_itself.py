@@ -97,7 +97,7 @@ def _without(found: Explained, k: int, stop: Callable[[], bool]) -> Fitted:
     whole = found.fitted
     assert found.plain is not None
     others = [t.candidate for i, t in enumerate(found.effects) if i != k]
-    less = extended(replace(found.plain, runs=whole.problem.runs, rests=whole.problem.rests), tuple(others))
+    less = replace(whole.problem, bench=extended(found.plain, tuple(others)).bench)
     point = whole.evaluation.point
     point = replace(point, theta=carried(less, whole.problem, point).theta)
     curved = any(c.curved for c in others)

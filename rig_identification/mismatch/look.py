@@ -58,7 +58,7 @@ from rig_identification.mismatch.unbent import MOST, at_first, best_of, likely, 
 FINISHED = 3
 #: What gives way or swings that is tried before changes of numbers which promise less.
 AT_ONCE = 3
-#: Hypotheses that are named where time was over before they could be fitted.
+#: Hypotheses that are named where the work was done before they could be fitted.
 WAITING = 3
 #: Promises as good as the best that are fitted beside what is certain.
 ALIKE = 2

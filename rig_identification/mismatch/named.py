@@ -131,7 +131,7 @@ class _Naming:
                 led=None if known is None else known.done[0],
             )
             if known is not None and not any(map(at_noise, tried.done)):
-                # Time ran out before it was come to again
+                # The work was done before it was come to again
                 tried = known
         self.known = Trials(list(tried.beside), asked=tried.asked) if tried.beside else None
         search.screened = None

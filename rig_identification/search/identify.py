@@ -38,7 +38,7 @@ from rig_identification.model.work import counted
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted
 from rig_identification.search.search import search
-from rig_identification.search.so_far import SoFar, accounted, interrupted
+from rig_identification.search.so_far import SoFar, accounted, both_accounted, interrupted, with_work_told
 
 Progress = Callable[[str, float], None]
 
@@ -77,7 +77,9 @@ def identify(
     session = without_lines(session, lines)
 
     def ended(found: Identification) -> Identification:
-        found = replace(found, mismatch=with_lines(with_overranges(found.mismatch, session), lines))
+        found = replace(
+            with_work_told(found), mismatch=with_lines(with_overranges(found.mismatch, session), lines)
+        )
         return found if origins.given else told(found, origins)
 
     with counted():
@@ -112,7 +114,8 @@ def _without_unseen(found: Identification, rest: Identification, note: str) -> I
     first = found.mismatch
     mismatch = replace(first, explanation=f"{note} {first.explanation}")
     figures = {**rest.figures, "ideal": found.figures.get("ideal", found)}
-    return replace(rest, mismatch=mismatch, notes=(*rest.notes, note), figures=figures)
+    told = replace(rest, mismatch=mismatch, notes=(*rest.notes, note), figures=figures)
+    return both_accounted(told, found)
 
 
 def _watched(ideal: Ideal, notify: Progress) -> Watched | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from rig_identification.estimate.identify import CAUTION, TIED, Ideal, compose, scores
@@ -89,10 +90,26 @@ def interrupted(answer: Identification) -> Identification:
 
 
 def accounted(answer: Identification, budget: Budget) -> Identification:
-    """The answer with the work that it took, and what was left untried, in a field and in words."""
-    work = Work(budget.used, budget.limit, tuple(budget.untried))
-    text = f"{work.used:.3g} units of work were computed; the search begins nothing new after {work.limit:g}."
-    if budget.spent():
+    """The answer with the work that it took, and what was left untried."""
+    return replace(answer, work=Work(budget.used, budget.limit, tuple(budget.untried)))
+
+
+def both_accounted(answer: Identification, before: Identification) -> Identification:
+    """The second answer to a session, with the work of the one ``before`` it as well."""
+    if answer.work is None or before.work is None:
+        return answer
+    one, two = before.work, answer.work
+    return replace(answer, work=Work(one.used + two.used, one.limit + two.limit, two.untried))
+
+
+def with_work_told(answer: Identification) -> Identification:
+    """The answer with its work as a sentence among its notes."""
+    work = answer.work
+    if work is None:
+        return answer
+    bound = f"begins nothing new after {work.limit:g}" if math.isfinite(work.limit) else "has no limit"
+    text = f"{work.used:.3g} units of work were computed; the search {bound}."
+    if work.used >= work.limit or work.untried:
         left = ", ".join(work.untried) or "nothing by name, but not every rival was followed to its end"
         text += f" It ended there. Left untried: {left}. The option --work gives it more."
-    return replace(answer, work=work, notes=(*answer.notes, text))
+    return replace(answer, notes=(*answer.notes, text))
