@@ -14,7 +14,13 @@ from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.enough import enough, told
 from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
-from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, rest_of, weak_prior
+from rig_identification.estimate.first_guess import (
+    elements_that_hang,
+    mocap_mount,
+    rest_of,
+    seen_whole,
+    weak_prior,
+)
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.followable import followable, hanging
 from rig_identification.estimate.growing import (
@@ -51,6 +57,7 @@ from rig_identification.estimate.solve import (
     solve,
 )
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
+from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -160,7 +167,7 @@ def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progr
         return Start(problem, launch.from_momentum().point(), launch.rest, held)
     if problem.bench.rig.mocap is not None:
         mount: MocapMount | None = mocap_mount(problem.bench.rig, watched, launch.rest, 0.0)
-    elif any(c.device == "imu" for c in watched.channels):
+    elif any(c.device == "imu" for c in watched.channels) and seen_whole(watched):
         track = tracked(blind.bench, without_mocap(watched).until(REGRESSED), launch.theta, launch.rest)
         mount = None if track is None else mount_from_track(watched, track)
     else:
@@ -232,9 +239,8 @@ def _note(name: str, part: FreePart) -> str:
 
 def only_watched(problem: Problem) -> bool:
     """Whether no device measures force or acceleration: the body is only seen to move."""
-    devices = {c.device for run in problem.runs for c in run.channels}
-    forces = devices & set(problem.bench.parameters.places.cables)
-    return bool(problem.runs) and not forces and "imu" not in devices
+    measured = {c.quantity for run in problem.runs for c in run.channels}
+    return bool(problem.runs) and not measured & FORCES
 
 
 def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:

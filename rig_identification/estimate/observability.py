@@ -123,7 +123,7 @@ def testimony(
     for run in problem.runs:
         channels = []
         for c in run.channels:
-            mute = [predicted.get((c.device, c.quantity, a), 0.0) > GAIN for a in range(c.width)]
+            mute = [predicted.get((c.device, c.quantity, a), 0.0) > GAIN for a in c.axes]
             channels.append(replace(c, noise=np.where(mute, SILENT, 1.0) * c.noise))
         runs.append(replace(run, channels=tuple(channels)))
     heard = replace(problem, runs=tuple(runs))

@@ -104,6 +104,7 @@ def _left(problem: Problem, pieces: tuple[Run, ...], theta: Array, rest: State) 
         if found is None:
             return np.inf
         run = found[0]
-        left = doubts.cost(run) - run.log_spread
+        # Within the noise one way of rolling is as good as another
+        left = max(doubts.cost(run) - run.log_spread, 0.5 * run.residual.size)
         total += 0.5 * run.residual.size * float(np.log(2.0 * left / run.residual.size))
     return total

@@ -19,6 +19,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.solve import ROUNDING, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
+from rig_identification.estimate.swing_period import long_enough
 from rig_identification.model.motion import State
 from rig_identification.model.sensors import MOCAP_SIZE
 
@@ -27,6 +28,9 @@ Array = NDArray[np.float64]
 #: Inertia as a multiple of the first guess, and depth as a share of the rig's extent.
 SIZES = tuple(float(s) for s in np.geomspace(0.3, 4.0, 9))
 DEPTHS = (0.05, 0.15, 0.4)
+#: From one of the sizes to the next, and how often the scan goes on beyond them while the best is the last:
+#: each time by a factor of 3.6.
+RATIO, FARTHER = SIZES[1] / SIZES[0], 4
 #: Piece that the scan looks at, s, taken from the middle of the second half of a run.
 SCANNED = 4.0
 #: Share of the weak prior's std within which the brief fit may move from the scan's best.
@@ -43,7 +47,7 @@ class Scanned:
 
 
 def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], depths, sizes):  # type: ignore[no-untyped-def]
-    """Yield (bench, theta, rest, start, heading) over headings, depths and sizes."""
+    """Yield (bench, theta, rest, start, heading, size) over headings, depths and sizes."""
     parameters, rig = problem.bench.parameters, problem.bench.rig
     first = parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))
     size = float(np.max(extent(rig)))
@@ -63,20 +67,37 @@ def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], dep
                 if bench.mocap is not None:
                     model = model_at(parameters, theta)
                     start = start_from_mocap(model, piece, bench.mocap, np.zeros(MOCAP_SIZE))
-                yield bench, theta, rest, rest if start is None else start, heading
+                yield bench, theta, rest, rest if start is None else start, heading, scale
 
 
 def _best(piece: Run, tried):  # type: ignore[no-untyped-def]
-    """The one of (bench, theta, rest, start, heading) that fits best, with its own best start.
+    """The one of what is tried that fits best, with its own best start, and its cost behind it.
 
     Of those that no recording tells apart the first one: rounding is no reason.
     """
     best, kept = np.inf, None
-    for bench, theta, rest, start, heading in tried:
+    for bench, theta, rest, start, heading, scale in tried:
         found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
         if found is not None and (kept is None or found[0].cost < best - ROUNDING * abs(best)):
-            best, kept = found[0].cost, (bench, theta, rest, found[1], heading)
+            best, kept = found[0].cost, (bench, theta, rest, found[1], heading, scale, found[0].cost)
     return kept
+
+
+def _of_any_size(problem: Problem, half: Run, piece: Run, heading: float):  # type: ignore[no-untyped-def]
+    """The best over depths and SIZES, and over smaller or larger ones while the best is the last of them."""
+    sizes, best = SIZES, None
+    for _ in range(FARTHER):
+        found = _best(piece, _tried(problem, half, piece, [heading], DEPTHS, sizes))
+        if found is None or (best is not None and not found[6] < best[6]):
+            return best
+        best = found
+        if best[5] == sizes[-1] and sizes[-1] >= SIZES[-1]:
+            sizes = tuple(sizes[-1] * RATIO**k for k in range(1, 5))
+        elif best[5] == min(sizes) and min(sizes) <= SIZES[0]:
+            sizes = tuple(min(sizes) / RATIO**k for k in range(1, 5))
+        else:
+            return best
+    return best
 
 
 def scan(problem: Problem, run: Run) -> Scanned | None:
@@ -86,14 +107,14 @@ def scan(problem: Problem, run: Run) -> Scanned | None:
     """
     nodes = run.grid.nodes
     half = run.between(nodes // 2, nodes - 1)
-    piece = half.until(SCANNED)
+    piece = half.until(long_enough(half, SCANNED))
     all_headings = headings(problem.bench.rig, half) if half.R_tracker_mean is not None else [0.0]
     kept = _best(piece, _tried(problem, half, piece, all_headings, DEPTHS[1:2], SIZES[::2]))
     if kept is not None:
-        kept = _best(piece, _tried(problem, half, piece, [kept[4]], DEPTHS, SIZES))
+        kept = _of_any_size(problem, half, piece, kept[4])
     if kept is None:
         return None
-    bench, theta, rest, start, _ = kept
+    bench, theta, rest, start = kept[:4]
     settled = replace(problem, bench=bench, runs=(run,), weak_center=theta[:INERTIAL].copy())
     brief = replace(settled, runs=(piece,), rests=(), weak=NEAR * problem.weak)
     evaluation, _ = solve(brief, Point(theta, (start,), ()), iterations=25, tolerance=0.5)

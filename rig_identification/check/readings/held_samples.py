@@ -3,6 +3,9 @@
 After a change of several converter steps the next sample is exactly the same, in all components, far more
 often than noise and rounding bring it to within one step. A resting signal on a coarse converter repeats
 too, but never after a change of several steps.
+
+What is read off the pictures of a compressed film repeats to within a hair: the picture is the same, and
+coded anew. Where nothing repeats exactly, that is looked for as well.
 """
 
 from __future__ import annotations
@@ -49,6 +52,11 @@ _HELD = 0.9
 _RUNS = 32
 #: Fewer repeats than one in ten do no harm: a sample late by one interval now and then.
 _SELDOM = 0.1
+#: A hair, as a share of the step that a signal takes in one sample of four or more.
+_HAIR = 0.02
+#: How often at most a step that follows a large one is no more than a hair without a fault: noise whose
+#: density of steps is _PEAK times the mean one at 0, of which a hair either way is so much; rounded up.
+_HAIR_BY_CHANCE = 0.1
 #: Two cells on one logger are read at one rate.
 _SAME_RATE = 0.02
 
@@ -71,18 +79,31 @@ class _Changes:
 
 def find(session: RawSession) -> tuple[Found, ...]:
     """Channels whose samples are repeated; each keeps the first sample of every hold."""
-    spotted = [one for (_, _), recorded in channels_of(session) for one in _spotted(session, recorded)]
+    spotted = []
+    for _, recorded in channels_of(session):
+        spotted += _spotted(session, recorded, exactly=True) or _spotted(session, recorded, exactly=False)
     return told(session, together(spotted, tolerance=_SAME_RATE), _fault)
 
 
-def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:
-    """Each recording of one channel, where at least one of them shows that it is held."""
+def _spotted(
+    session: RawSession, recorded: list[tuple[int, RawChannel]], *, exactly: bool
+) -> list[Spotted]:
+    """Each recording of one channel, where at least one of them shows that it is held.
+
+    exactly: samples that differ by a hair are not held.
+    """
+    least = 0.0 if exactly else _HAIR_BY_CHANCE
+
+    def rows(channel: RawChannel, columns: tuple[int, ...]) -> Array:
+        return channel.values if exactly else _combed(channel.values, columns)
+
     holds: list[tuple[str, _Hold]] = []
     contradicted: set[int] = set()
     for number, channel in recorded:
         for quantity, columns in groups(channel).items():
-            changes = _changes(channel.values, columns)
-            hold = _hold(channel.values, columns, changes)
+            values = rows(channel, columns)
+            changes = _changes(values, columns, least)
+            hold = _hold(values, columns, changes)
             if hold is not None:
                 holds.append((quantity, hold))
             elif changes.events * _HELD > _DISTINCT and changes.repeated < 0.5 * changes.events:
@@ -94,9 +115,12 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]]) -> lis
     out = []
     for number, channel in recorded:
         shown = groups(channel).get(quantity)
-        if shown is None or (number in contradicted and not _held_here(channel, shown)):
+        if shown is None:
             continue
-        kept = _first_of_each(repeats(channel.values, shown), hold.samples)
+        values = rows(channel, shown)
+        if number in contradicted and _hold(values, shown, _changes(values, shown, least)) is None:
+            continue
+        kept = _first_of_each(repeats(values, shown), hold.samples)
         rate = 1.0 / (hold.samples * interval(channel)) if interval(channel) else 0.0
         out.append(
             Spotted(
@@ -107,8 +131,14 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]]) -> lis
     return out
 
 
-def _held_here(channel: RawChannel, columns: tuple[int, ...]) -> bool:
-    return _hold(channel.values, columns, _changes(channel.values, columns)) is not None
+def _combed(values: Array, columns: tuple[int, ...]) -> Array:
+    """The values with each sample that is within a hair of the one before it equal to that one."""
+    steps = np.abs(np.diff(values[:, list(columns)], axis=0))
+    near = np.all(steps <= _HAIR * np.nanpercentile(steps, 75.0, axis=0), axis=1)
+    first = np.append(0, np.where(near, 0, np.arange(1, len(values))))
+    combed = np.array(values)
+    combed[:, list(columns)] = values[np.ix_(np.maximum.accumulate(first), list(columns))]
+    return combed
 
 
 def _slowest(holds: list[tuple[str, _Hold]]) -> tuple[str, _Hold] | None:
@@ -120,7 +150,8 @@ def _slowest(holds: list[tuple[str, _Hold]]) -> tuple[str, _Hold] | None:
     return quantity, _Hold(float(np.median([hold.samples for hold in same])), sum(hold.gain for hold in same))
 
 
-def _changes(values: Array, columns: tuple[int, ...]) -> _Changes:
+def _changes(values: Array, columns: tuple[int, ...], least: float) -> _Changes:
+    """What follows large changes. least: chance of a repeat, at least."""
     same = repeats(values, columns)
     large, chance = np.zeros(len(values), bool), 1.0
     steps = {k: resolution(values[:, k]) for k in columns}
@@ -138,7 +169,7 @@ def _changes(values: Array, columns: tuple[int, ...]) -> _Changes:
         chance = min(chance, _PEAK * (near + 1) / (2 * _STEPS * max(len(event), 1)))
     distinct = len(np.unique(values[event, columns[0]])) if len(event) else 0
     distinct = max([distinct] + [len(np.unique(values[event, k])) for k in columns[1:]])
-    return _Changes(len(event), int(np.count_nonzero(same[event + 1])), chance, distinct)
+    return _Changes(len(event), int(np.count_nonzero(same[event + 1])), max(chance, least), distinct)
 
 
 def _hold(values: Array, columns: tuple[int, ...], changes: _Changes) -> _Hold | None:
@@ -178,7 +209,8 @@ def _first_of_each(same: Flags, samples: float) -> Flags:
     kept = ~same
     starts = np.flatnonzero(kept)
     lengths = np.diff(np.append(starts, len(same)))
-    holds = np.round(lengths / np.ceil(samples - 0.1)).astype(np.int64)
+    # What is half a hold too long is still one
+    holds = np.ceil(lengths / np.ceil(samples - 0.1) - 0.5).astype(np.int64)
     for k in np.flatnonzero(holds > 1):
         kept[starts[k] + (np.arange(holds[k]) * lengths[k]) // holds[k]] = True
     return kept
