@@ -265,12 +265,21 @@ def node_step(rig: Rig, recording: Recording) -> float:
     fast = (recording.imu, recording.exciter_force, recording.inclination)
     if not recording.tension and all(series is None for series in fast):
         return WATCHED_NODE_STEP
+    if _only_turns(recording) and _all_follow(rig, recording, WATCHED_NODE_STEP):
+        return WATCHED_NODE_STEP
     held = _force_step(rig, recording)
     if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
         return held
     if recording.duration > LONG_RUN or _all_follow(rig, recording, WIDE_NODE_STEP):
         return WIDE_NODE_STEP
     return NODE_STEP
+
+
+def _only_turns(recording: Recording) -> bool:
+    """Whether nothing that shows a jolt or a force is measured, a gyroscope at most."""
+    quick = (recording.exciter_force, recording.inclination)
+    jolts = recording.imu is not None and bool(recording.imu.parts(slice(3, 6)))
+    return not recording.tension and all(series is None for series in quick) and not jolts
 
 
 def _force_step(rig: Rig, recording: Recording) -> float:

@@ -30,6 +30,8 @@ from rig_identification.estimate.growing import (
     misfit,
     solve_growing,
 )
+from rig_identification.estimate.hung_by_eye import hung_by_eye
+from rig_identification.estimate.hung_by_eye import note_of as note_of_center
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, unsettled
@@ -117,7 +119,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     problem = Problem(
         Bench(rig, parameters), runs, rests, mass, weak_prior(rig), theta[:INERTIAL].copy(), bound=ORDINARY
     )
-    return problem, theta, held
+    return hung_by_eye(problem), theta, held
 
 
 def _runs_of(rig: Rig, recordings: tuple[Recording, ...]) -> tuple[Run, ...]:
@@ -285,7 +287,7 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
     fitted = fit_from(_begun(problem, theta, held, progress), progress)
-    fitted = replace(fitted, notes=(*told((*problem.runs, *held)), *fitted.notes))
+    fitted = replace(fitted, notes=(*told((*problem.runs, *held)), *note_of_center(problem), *fitted.notes))
     rods = rods_of(session.rig, (*problem.runs, *held))
     fitted = replace(fitted, notes=(*fitted.notes, note_of(rods))) if rods else fitted
     less = without_unseen_force(session, fitted, _surely_driven)

@@ -37,6 +37,7 @@ class Bench:
     rig: Rig
     parameters: ParameterSet
     mocap: sensors.MocapMount | None = None
+    unseen: bool = False  # nothing that was measured tells how far the body swings (unseen_swing.py)
 
 
 def model_at(parameters: ParameterSet, theta: Array) -> RigModel:

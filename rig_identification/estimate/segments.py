@@ -99,7 +99,8 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
     """Find the free stretch: short pieces are fitted by start states alone, and the bad ones are driven.
 
     The yardstick is the better half of the pieces. A piece at rest fits always and says nothing; what the
-    model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand.
+    model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand. Nor
+    is what noise leaves of a piece, however well others fit.
     """
     cut = pieces_of(run, SHORT_PIECE / PIECE * long_enough(run, PIECE))
     errors = np.full(len(cut), np.inf)
@@ -109,7 +110,7 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
         if fitted is not None:
             errors[i] = float(np.sqrt(np.mean(fitted[0].residual ** 2)))
     shares = errors / swing
-    driven = (errors > DRIVEN * _calm(errors)) & (shares > DRIVEN * _calm(shares))
+    driven = (errors > DRIVEN * max(_calm(errors), 1.0)) & (shares > DRIVEN * _calm(shares))
     best, begin = (0, 0), 0
     for i in range(len(cut) + 1):
         if i == len(cut) or driven[i]:

@@ -10,7 +10,7 @@ coded anew. Where nothing repeats exactly, that is looked for as well.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import bdtrc
@@ -26,6 +26,7 @@ from rig_identification.check.readings.channel_model import (
     repeats,
     resolution,
 )
+from rig_identification.check.readings.held_stamps import steady
 from rig_identification.check.readings.telling import (
     Spotted,
     devices_of,
@@ -85,9 +86,7 @@ def find(session: RawSession) -> tuple[Found, ...]:
     return told(session, together(spotted, tolerance=_SAME_RATE), _fault)
 
 
-def _spotted(
-    session: RawSession, recorded: list[tuple[int, RawChannel]], *, exactly: bool
-) -> list[Spotted]:
+def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]], *, exactly: bool) -> list[Spotted]:
     """Each recording of one channel, where at least one of them shows that it is held.
 
     exactly: samples that differ by a hair are not held.
@@ -120,15 +119,27 @@ def _spotted(
         values = rows(channel, shown)
         if number in contradicted and _hold(values, shown, _changes(values, shown, least)) is None:
             continue
-        kept = _first_of_each(repeats(values, shown), hold.samples)
+        same = repeats(values, shown)
+        kept = _first_of_each(same, hold.samples)
+        # Within a hair of what it was no moving signal comes to rest: a long hold is one picture, shown on
+        fresh = kept if exactly else ~same
         rate = 1.0 / (hold.samples * interval(channel)) if interval(channel) else 0.0
         out.append(
             Spotted(
-                channel.device, channel.channel, number, only(channel, kept),
-                count=int(np.count_nonzero(~kept)), gain=hold.gain / len(recorded), value=rate,
+                channel.device, channel.channel, number, _of_each(channel, kept, fresh),
+                count=int(np.count_nonzero(~fresh)), gain=hold.gain / len(recorded), value=rate,
             )
         )  # fmt: skip
     return out
+
+
+def _of_each(channel: RawChannel, kept: Flags, fresh: Flags) -> RawChannel:
+    """The channel with the ``fresh`` ones of the first samples of all holds, stamped when they were measured.
+
+    kept (n,): one for each time that the device measured. fresh (n,): those that are not shown on.
+    """
+    first = only(channel, kept)
+    return only(replace(first, stamp_ns=steady(first.stamp_ns, interval(channel))), fresh[kept])
 
 
 def _combed(values: Array, columns: tuple[int, ...]) -> Array:
