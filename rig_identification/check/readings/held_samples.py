@@ -121,22 +121,23 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]], *, exa
             continue
         same = repeats(values, shown)
         kept = _first_of_each(same, hold.samples)
-        # Within a hair of what it was no moving signal comes to rest: a long hold is one picture, shown on
-        fresh = kept if exactly else ~same
+        left = only(channel, kept) if exactly else _of_film(channel, kept, ~same)
         rate = 1.0 / (hold.samples * interval(channel)) if interval(channel) else 0.0
         out.append(
             Spotted(
-                channel.device, channel.channel, number, _of_each(channel, kept, fresh),
-                count=int(np.count_nonzero(~fresh)), gain=hold.gain / len(recorded), value=rate,
+                channel.device, channel.channel, number, left,
+                count=len(channel.stamp_ns) - len(left.stamp_ns), gain=hold.gain / len(recorded), value=rate,
             )
         )  # fmt: skip
     return out
 
 
-def _of_each(channel: RawChannel, kept: Flags, fresh: Flags) -> RawChannel:
-    """The channel with the ``fresh`` ones of the first samples of all holds, stamped when they were measured.
+def _of_film(channel: RawChannel, kept: Flags, fresh: Flags) -> RawChannel:
+    """The channel with the pictures that are new, stamped when they were taken.
 
-    kept (n,): one for each time that the device measured. fresh (n,): those that are not shown on.
+    A film's stamps count its pictures, new or shown on. kept (n,): one for each time that the camera took a
+    picture. fresh (n,): those that are new: within a hair of what it was no moving signal comes to rest, and
+    a long hold is one picture where another was lost.
     """
     first = only(channel, kept)
     return only(replace(first, stamp_ns=steady(first.stamp_ns, interval(channel))), fresh[kept])
