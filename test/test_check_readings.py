@@ -147,7 +147,7 @@ def test_a_compressed_film_shows_its_pictures_again() -> None:
     taken[taken == 95] = 94
     rng = np.random.default_rng(3)
     jitter = 2e-4 * rng.normal(size=taken.max() + 1)
-    angle = 0.12 * np.sin(2.0 * np.pi * 1.146 * taken / camera) + jitter[taken]
+    angle = 0.12 * np.sin(2.0 * np.pi * 1.146 * taken / camera + 0.5) + jitter[taken]
     angle = angle + 1e-5 * rng.normal(size=angle.size)
     pose = np.zeros((angle.size, 7))
     pose[:, 5], pose[:, 6] = np.sin(0.5 * angle), np.cos(0.5 * angle)

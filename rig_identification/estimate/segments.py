@@ -15,14 +15,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.launch import launch_state, launch_states
+from rig_identification.estimate.noise import FITTED_SAMPLES
 from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.sampling import sample_noise_std
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import CannotBeFollowed, Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
-from rig_identification.estimate.swing_period import long_enough, swing_period
+from rig_identification.estimate.swing_period import beside_a_swing, long_enough, swing_period
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -149,15 +150,19 @@ def with_noise_of_swing(run: Run) -> Run:
 
     Neighbouring samples show a tracker's white noise alone. What wanders with the pose (markers
     hidden and found again, lens errors) is noise as well: all that a cubic over a quarter of
-    the swing's period does not follow.
+    the swing's period does not follow; of samples too seldom for that, all that no swing follows.
     """
     period = swing_period(run)
+
+    def heard(c: Channel) -> Array:
+        often = c.time.size / run.grid.duration * 0.25 * period > FITTED_SAMPLES
+        if often:
+            return sample_noise_std(c.time, c.values, 0.25 * period)
+        return beside_a_swing(c.time, c.values, period)
+
     return replace(
         run,
         channels=tuple(
-            replace(c, noise=np.maximum(c.noise, sample_noise_std(c.time, c.values, 0.25 * period)))
-            if c.noise_estimated
-            else c
-            for c in run.channels
+            replace(c, noise=np.maximum(c.noise, heard(c))) if c.noise_estimated else c for c in run.channels
         ),
     )

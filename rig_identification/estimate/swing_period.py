@@ -1,12 +1,17 @@
-"""How long a swing takes, and so how long a piece of a run has to be to tell of it."""
+"""How long a swing takes, how long a piece of a run has to be to tell of it, and what lies beside it."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.sampling import LOCAL
 
+Array = NDArray[np.float64]
+
+#: Swings over which one is followed by its own line, its size and its middle changing steadily: six numbers.
+FOLLOWED = 2.0
 #: Swings that a piece holds at least where nothing but the motion is measured: inertia then shows in the
 #: period alone, and a period in no less than a turn and its half.
 SWINGS = 1.5
@@ -32,3 +37,20 @@ def long_enough(run: Run, seconds: float) -> float:
     if any(c.quantity in FORCES for c in run.channels):
         return seconds
     return max(seconds, min(SWINGS * swing_period(run), run.grid.duration))
+
+
+def beside_a_swing(time: Array, values: Array, period: float) -> Array:
+    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell."""
+    block = np.floor((time - time[0]) / (FOLLOWED * period)).astype(np.int64)
+    total, freedom = np.zeros(values.shape[1]), 0
+    for number in np.unique(block):
+        t = time[block == number] / period
+        if t.size < 12:
+            continue
+        t = t - np.mean(t)
+        angle = 2.0 * np.pi * t
+        line = np.stack([np.ones_like(t), np.cos(angle), np.sin(angle)], axis=1)
+        basis = np.linalg.qr(np.concatenate([line, t[:, None] * line], axis=1))[0]
+        rest = values[block == number] - basis @ (basis.T @ values[block == number])
+        total, freedom = total + np.sum(rest**2, axis=0), freedom + t.size - basis.shape[1]
+    return np.asarray(np.sqrt(total / max(freedom, 1)))
