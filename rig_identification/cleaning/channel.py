@@ -120,7 +120,9 @@ def _clean(
     values: NDArray[np.float64],
     moving: bool,
 ) -> Channel:
-    values = np.where(np.abs(values) < _ABSURD, values, np.nan)
+    # What is NaN was not measured; a number that cannot be tells that its message is damaged
+    damaged = np.any(np.abs(values) >= _ABSURD, axis=1)
+    values = np.where(damaged[:, None], np.nan, values)
     notes: tuple[str, ...] = ()
     if topic.channel in _POSES:
         values = _with_unit_quaternions(values)
@@ -180,7 +182,7 @@ def _names(channel: str) -> list[str]:
 
 
 def _with_unit_quaternions(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions scaled to norm 1; one of norm 0 or far from 1 is no orientation and becomes NaN.
+    """Quaternions scaled to norm 1; a pose with one of norm 0 or far from 1 is none and becomes NaN.
 
     w and one of x, y, z with NaN in the two others: a turn about that axis, and nothing is known of others.
     Of two numbers otherwise, or three, no turn can be told.
@@ -191,7 +193,9 @@ def _with_unit_quaternions(values: NDArray[np.float64]) -> NDArray[np.float64]:
     one_axis = known[:, 3] & (np.count_nonzero(known[:, :3], axis=1) == 1)
     turns[~(known.all(axis=1) | one_axis)] = np.nan
     norms = np.sqrt(np.nansum(turns**2, axis=1, keepdims=True))
-    norms[np.abs(norms - 1.0) > 0.1] = np.nan
+    told = np.isfinite(turns[:, 3])
+    unit[told & (np.abs(norms[:, 0] - 1.0) > 0.1)] = np.nan
+    norms[~told] = np.nan
     norms[np.abs(norms - 1.0) < 1e-12] = 1.0  # a second reading changes nothing
     turns /= norms
     return unit
