@@ -1,4 +1,4 @@
-"""What is measured in part: the same body from a gyroscope alone, an angle, a marker's x and y."""
+"""What is measured in part: the same body from a gyroscope alone, one rate, an attitude, an angle."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from rig_identification.simulate.start import Posed
 
 JZZ = ELEMENTS.index("Jzz")
 NOISE = {"angular_rate": 1e-3, "specific_force": 0.02, "mocap_position": 5e-4, "mocap_orientation": 1e-3}
-#: A marker out at an arm, so that its place tells of the turn.
+#: Where the tracker's marker sits, and the IMU beside the datum.
 MARKER = Mount(np.array([0.5, 0.3, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
 UPRIGHT = Mount(np.array([1.2, -0.4, 0.1]), np.array([0.0, 0.0, np.sin(0.2), np.cos(0.2)]))
 #: Columns of the tracker's and the IMU's series.
-X, Y, Z, QX, QY = range(5)
+X, Y, Z = range(3)
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,6 @@ PARTS = {
     "gyroscope": ([3, 4, 5], None),
     "one_rate": ([0, 1, 3, 4, 5], None),
     "attitude": (None, [X, Y, Z]),
-    "x_and_y_of_a_marker": (None, [Z, QX, QY, 5, 6]),
     "heading": (None, []),
 }
 
@@ -120,10 +119,9 @@ def test_a_part_tells_the_same_body_less_surely(
     assert "Jzz" not in told.unobservable
     assert abs(told.values[JZZ] - truth[JZZ]) < 4.0 * std
     assert std > 0.9 * float(np.sqrt(whole.covariance[JZZ, JZZ]))
-    if part != "x_and_y_of_a_marker":
-        # Nothing but turns: where the centre of mass hangs is taken, and not told
-        assert {"cx", "cy"} <= set(told.unobservable)
-        assert std > 2.0 * BESIDE**2 * truth[JZZ]
+    # Nothing but turns: where the centre of mass hangs is taken, and not told
+    assert {"cx", "cy"} <= set(told.unobservable)
+    assert std > 2.0 * BESIDE**2 * truth[JZZ]
 
 
 def test_samples_in_which_a_part_is_missing_are_used_for_the_rest(

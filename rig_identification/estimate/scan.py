@@ -8,6 +8,7 @@ state, lands inside the basin.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,8 +47,28 @@ class Scanned:
     rest: State
 
 
-def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], depths, sizes):  # type: ignore[no-untyped-def]
-    """Yield (bench, theta, rest, start, heading, size) over headings, depths and sizes."""
+@dataclass(frozen=True)
+class _Tried:
+    """One body under one heading, and how it fits from its best start."""
+
+    bench: Bench
+    theta: Array
+    rest: State
+    start: State
+    heading: float
+    size: float
+    cost: float = np.inf
+
+
+def _tried(
+    problem: Problem,
+    whole: Run,
+    piece: Run,
+    headings_: Sequence[float],
+    depths: Sequence[float],
+    sizes: Sequence[float],
+) -> Iterator[_Tried]:
+    """Every heading, depth and size, not yet fitted."""
     parameters, rig = problem.bench.parameters, problem.bench.rig
     first = parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))
     size = float(np.max(extent(rig)))
@@ -67,36 +88,37 @@ def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], dep
                 if bench.mocap is not None:
                     model = model_at(parameters, theta)
                     start = start_from_mocap(model, piece, bench.mocap, np.zeros(MOCAP_SIZE))
-                yield bench, theta, rest, rest if start is None else start, heading, scale
+                yield _Tried(bench, theta, rest, rest if start is None else start, heading, scale)
 
 
-def _best(piece: Run, tried):  # type: ignore[no-untyped-def]
-    """The one of what is tried that fits best, with its own best start, and its cost behind it.
+def _best(piece: Run, tried: Iterable[_Tried]) -> _Tried | None:
+    """The one of what is tried that fits best, with its own best start; None where none can be followed.
 
     Of those that no recording tells apart the first one: rounding is no reason.
     """
-    best, kept = np.inf, None
-    for bench, theta, rest, start, heading, scale in tried:
-        found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
-        if found is not None and (kept is None or found[0].cost < best - ROUNDING * abs(best)):
-            best, kept = found[0].cost, (bench, theta, rest, found[1], heading, scale, found[0].cost)
-    return kept
+    best: _Tried | None = None
+    for one in tried:
+        found = fit_start(one.bench, piece, one.theta, one.start, tolerance=1.0, iterations=6)
+        if found is not None and (best is None or found[0].cost < best.cost - ROUNDING * abs(best.cost)):
+            best = replace(one, start=found[1], cost=found[0].cost)
+    return best
 
 
-def _of_any_size(problem: Problem, half: Run, piece: Run, heading: float):  # type: ignore[no-untyped-def]
+def _of_any_size(problem: Problem, half: Run, piece: Run, heading: float) -> _Tried | None:
     """The best over depths and SIZES, and over smaller or larger ones while the best is the last of them."""
-    sizes, best = SIZES, None
+    sizes: Sequence[float] = SIZES
+    best: _Tried | None = None
     for _ in range(FARTHER):
         found = _best(piece, _tried(problem, half, piece, [heading], DEPTHS, sizes))
-        if found is None or (best is not None and not found[6] < best[6]):
-            return best
+        if found is None or (best is not None and not found.cost < best.cost):
+            break
         best = found
-        if best[5] == sizes[-1] and sizes[-1] >= SIZES[-1]:
-            sizes = tuple(sizes[-1] * RATIO**k for k in range(1, 5))
-        elif best[5] == min(sizes) and min(sizes) <= SIZES[0]:
-            sizes = tuple(min(sizes) / RATIO**k for k in range(1, 5))
+        if best.size == max(sizes) >= SIZES[-1]:
+            sizes = [best.size * RATIO**k for k in range(1, 5)]
+        elif best.size == min(sizes) <= SIZES[0]:
+            sizes = [best.size / RATIO**k for k in range(1, 5)]
         else:
-            return best
+            break
     return best
 
 
@@ -111,11 +133,10 @@ def scan(problem: Problem, run: Run) -> Scanned | None:
     all_headings = headings(problem.bench.rig, half) if half.R_tracker_mean is not None else [0.0]
     kept = _best(piece, _tried(problem, half, piece, all_headings, DEPTHS[1:2], SIZES[::2]))
     if kept is not None:
-        kept = _of_any_size(problem, half, piece, kept[4])
+        kept = _of_any_size(problem, half, piece, kept.heading)
     if kept is None:
         return None
-    bench, theta, rest, start = kept[:4]
-    settled = replace(problem, bench=bench, runs=(run,), weak_center=theta[:INERTIAL].copy())
+    settled = replace(problem, bench=kept.bench, runs=(run,), weak_center=kept.theta[:INERTIAL].copy())
     brief = replace(settled, runs=(piece,), rests=(), weak=NEAR * problem.weak)
-    evaluation, _ = solve(brief, Point(theta, (start,), ()), iterations=25, tolerance=0.5)
-    return Scanned(settled, evaluation.point.theta, rest)
+    evaluation, _ = solve(brief, Point(kept.theta, (kept.start,), ()), iterations=25, tolerance=0.5)
+    return Scanned(settled, evaluation.point.theta, kept.rest)

@@ -145,11 +145,12 @@ def _of_film(channel: RawChannel, kept: Flags, fresh: Flags) -> RawChannel:
 
 def _combed(values: Array, columns: tuple[int, ...]) -> Array:
     """The values with each sample that is within a hair of the one before it equal to that one."""
-    steps = np.abs(np.diff(values[:, list(columns)], axis=0))
+    chosen = np.array(columns, dtype=np.int64)
+    steps = np.abs(np.diff(values[:, chosen], axis=0))
     near = np.all(steps <= _HAIR * np.nanpercentile(steps, 75.0, axis=0), axis=1)
     first = np.append(0, np.where(near, 0, np.arange(1, len(values))))
     combed = np.array(values)
-    combed[:, list(columns)] = values[np.ix_(np.maximum.accumulate(first), list(columns))]
+    combed[:, chosen] = values[np.maximum.accumulate(first)][:, chosen]
     return combed
 
 
