@@ -18,10 +18,41 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Series:
-    """Samples of one quantity on one device's clock: finite, strictly increasing in time."""
+    """Samples of one device on its own clock, strictly increasing in time.
+
+    A number that is NaN was not measured. Every sample holds one that was.
+    """
 
     time: Array  # (n,) s after the recording's start
     values: Array  # (n, width)
+
+    def parts(self, columns: slice = slice(None)) -> tuple[Part, ...]:
+        """Which of ``columns`` were measured together, and when; what was measured most often comes first.
+
+        A device that always measures all of them makes one part of all its samples, in which every number is
+        finite. So does every other part, of the samples and the columns that it holds.
+        """
+        values = self.values[:, columns]
+        indices = np.arange(self.values.shape[1])[columns]
+        known = np.isfinite(values)
+        if known.all():
+            return (Part(tuple(indices.tolist()), Series(self.time, values)),) if known.size else ()
+        kinds, member, counts = np.unique(known, axis=0, return_inverse=True, return_counts=True)
+        out = []
+        for kind in np.argsort(-counts, kind="stable").tolist():
+            held, rows = kinds[kind], member.ravel() == kind
+            if held.any():
+                of_part = Series(self.time[rows], np.ascontiguousarray(values[rows][:, held]))
+                out.append(Part(tuple(indices[held].tolist()), of_part))
+        return tuple(out)
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a device measured together."""
+
+    components: tuple[int, ...]  # columns of the device's series, ascending
+    series: Series  # (n, len(components)), finite
 
 
 @dataclass(frozen=True)

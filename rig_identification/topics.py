@@ -9,6 +9,7 @@ from rig_identification.errors import InputError, did_you_mean
 from rig_identification.rig import Rig
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
+POSE, POINT, ANGLE = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PointStamped", "std_msgs/msg/Float64"
 DEFAULT_NAMESPACE = "/rig"
 
 #: Channels besides the cables: contract name -> (channel, message type).
@@ -17,9 +18,12 @@ FIXED_TOPICS = {
     "exciter/joint_states": ("exciter_shaft", "sensor_msgs/msg/JointState"),
     "imu/data_raw": ("imu", "sensor_msgs/msg/Imu"),
     "inclinometer/angles": ("inclination", "geometry_msgs/msg/Vector3Stamped"),
-    "mocap/pose": ("mocap", "geometry_msgs/msg/PoseStamped"),
+    "mocap/pose": ("mocap", POSE),
     "ground_truth/odometry": ("ground_truth", "nav_msgs/msg/Odometry"),
 }
+
+#: Other types in which a channel may come, of devices that measure a part of it.
+IN_PART = {"mocap": (POINT, ANGLE)}
 
 #: First parts of the fixed topics: no cable may be named so.
 DEVICES = frozenset(name.partition("/")[0] for name in FIXED_TOPICS)
@@ -33,6 +37,11 @@ class Topic:
     channel: str  # "tension" or a channel of FIXED_TOPICS
     message_type: str
     cable: str | None = None
+
+    @property
+    def message_types(self) -> tuple[str, ...]:
+        """Types of message that the channel may come in, the contract's own first."""
+        return (self.message_type, *IN_PART.get(self.channel, ()))
 
 
 def expected_topics(
@@ -103,7 +112,7 @@ def check_mapped(
         if name in held:
             continue
         kind = expected[name].message_type
-        alike = sorted(other for other, its in held.items() if its == kind)
+        alike = sorted(other for other, its in held.items() if its in expected[name].message_types)
         there = f"of type {kind} they hold {', '.join(alike)}" if alike else f"none holds a {kind}"
         raise InputError(
             f"--topic {key}={given}: no bag holds {name}; {there}{did_you_mean(name, alike or held)}"

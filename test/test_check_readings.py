@@ -136,6 +136,33 @@ def test_held_samples_keep_the_first_of_each(samples: float) -> None:
     assert same == 1.0 if samples >= 2.0 else same > 0.999
 
 
+def test_a_compressed_film_shows_its_pictures_again() -> None:
+    """A camera of 15.07 Hz in a film of 30: pictures repeat to within what the coder makes of them.
+
+    Stamps count the film's pictures. One picture of the camera is lost, and the one before it shown on.
+    """
+    seconds, camera, film = 14.0, 15.07, 30.0
+    shown = np.arange(round(seconds * film))
+    taken = np.ceil(shown / film * camera - 1e-9).astype(int)
+    taken[taken == 95] = 94
+    rng = np.random.default_rng(3)
+    jitter = 2e-4 * rng.normal(size=taken.max() + 1)
+    angle = 0.12 * np.sin(2.0 * np.pi * 1.146 * taken / camera + 0.5) + jitter[taken]
+    angle = angle + 1e-5 * rng.normal(size=angle.size)
+    pose = np.zeros((angle.size, 7))
+    pose[:, 5], pose[:, 6] = np.sin(0.5 * angle), np.cos(0.5 * angle)
+    run = RawRecording("run_1", "dynamic", False, "run_1", (channel("mocap", "mocap/pose", pose, film),))
+    fault, corrected = the_one(RawSession("film", make_rig(), (run,)), "held_samples", "mocap")
+    assert fault.parameters["rate"]["value"] == pytest.approx(camera, rel=0.02)
+    left = corrected.recordings[0].channels[0]
+    # Where the swing turns back two pictures may be alike by chance
+    assert len(left.stamp_ns) >= 205
+    picture = (left.stamp_ns - left.stamp_ns[0]) / 1e9 * camera
+    # As they were, stamps are half a picture off where the camera's clock and the film's slip by one
+    assert np.max(np.abs(picture - np.round(picture))) < 0.25
+    assert np.count_nonzero(np.diff(np.round(picture)) == 1.0) >= 200
+
+
 def test_an_accelerometer_slower_than_its_gyroscope_is_held() -> None:
     def slower(values: np.ndarray) -> np.ndarray:
         values[:, 3:] = held(4.0)(values[:, 3:])

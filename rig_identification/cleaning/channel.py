@@ -25,8 +25,11 @@ _CAN_CLIP: dict[str, tuple[tuple[str | None, str, str | None, str], ...]] = {
     ),
     "inclination": tuple(("inclinometer", "inclination", a, "rad") for a in "xy"),
 }
+#: Channels of which a sample is used where any of its numbers was measured.
+_IN_PART = ("imu", "inclination", "mocap")
 #: Channels that carry a quaternion in columns 3 to 6.
 _POSES = ("mocap", "ground_truth")
+_POSE_WIDTH = 7
 _GAP = 1.5  # median intervals
 #: No channel measures this in SI units: damaged bytes read as a number.
 _ABSURD = 1e12
@@ -88,8 +91,10 @@ class Channel:
         return Overrange(name, quantity, axis, unit, limit.value, len(stamps), first, last)
 
 
-def clean_channel(raw: RawChannel, where: str) -> Channel:
+def clean_channel(raw: RawChannel, where: str, *, moving: bool = False) -> Channel:
     """Choose the usable samples of one topic; ``where`` is the bag, for messages.
+
+    moving: the body moves in the recording.
 
     Raises
     ------
@@ -104,7 +109,7 @@ def clean_channel(raw: RawChannel, where: str) -> Channel:
         )
     topic = Topic(raw.topic, raw.channel, raw.message_type, raw.cable)
     kept = selection.kept
-    return _clean(topic, len(raw.stamp_ns), selection, raw.stamp_ns[kept], raw.values[kept])
+    return _clean(topic, len(raw.stamp_ns), selection, raw.stamp_ns[kept], raw.values[kept], moving)
 
 
 def _clean(
@@ -113,15 +118,24 @@ def _clean(
     selection: StampSelection,
     stamp_ns: NDArray[np.int64],
     values: NDArray[np.float64],
+    moving: bool,
 ) -> Channel:
-    values = np.where(np.abs(values) < _ABSURD, values, np.nan)
+    # What is NaN was not measured; a number that cannot be tells that its message is damaged
+    damaged = np.any(np.abs(values) >= _ABSURD, axis=1)
+    values = np.where(damaged[:, None], np.nan, values)
     notes: tuple[str, ...] = ()
     if topic.channel in _POSES:
         values = _with_unit_quaternions(values)
-    finite = np.isfinite(values).all(axis=1)
+    held = _filled(values) if moving and topic.channel in _IN_PART else []
+    values[:, held] = np.nan
+    known = np.isfinite(values)
+    finite = known.any(axis=1) if topic.channel in _IN_PART else known.all(axis=1)
     if not finite.any():
         notes = ("never a number in every field: taken as not measured",)
-    elif topic.channel in _CAN_CLIP and len(values) >= _STUCK and not np.ptp(values[finite], axis=0).any():
+    elif held:
+        names = ", ".join(_names(topic.channel)[k] for k in held)
+        notes = (f"{names}: one and the same number in every message, taken as not measured",)
+    elif topic.channel in _CAN_CLIP and len(values) >= _STUCK and not _changes(values[finite]).any():
         notes = ("the values never change: the device may be stuck or switched off",)
     clipped = np.zeros(len(values), bool)
     ends = limits(values[finite]) if topic.channel in _CAN_CLIP else []
@@ -136,11 +150,52 @@ def _clean(
     )  # fmt: skip
 
 
+def _filled(values: NDArray[np.float64]) -> list[int]:
+    """Columns that hold one and the same number throughout, where others of the device change.
+
+    A device that measures something that moves never does so: its noise alone, or the step of its converter,
+    changes the last digit. Whoever wrote the messages put a number where nothing was measured.
+    """
+    changes = _changes(values)
+    if len(values) < _STUCK or not changes.any():
+        return []
+    still = ~changes & (np.count_nonzero(np.isfinite(values), axis=0) >= _STUCK)
+    if values.shape[1] == _POSE_WIDTH:
+        # Of a turn only two zeros beside the third axis may stand for what was not measured
+        zero = still[3:6] & ~np.nan_to_num(values[:, 3:6]).any(axis=0)
+        still[3:] = [*(zero if np.count_nonzero(zero) == 2 else np.zeros(3, bool)), False]
+    return [int(k) for k in np.flatnonzero(still)]
+
+
+def _changes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(width,) which columns hold more than one number."""
+    highest = np.max(values, axis=0, where=np.isfinite(values), initial=-np.inf)
+    lowest = np.min(values, axis=0, where=np.isfinite(values), initial=np.inf)
+    return np.asarray(highest > lowest)
+
+
+def _names(channel: str) -> list[str]:
+    """What each column of a channel is called."""
+    if channel in _CAN_CLIP:
+        return [f"{quantity} {axis}".replace("_", " ") for _, quantity, axis, _ in _CAN_CLIP[channel]]
+    return [*(f"position {a}" for a in "xyz"), *(f"orientation {a}" for a in "xyzw")]
+
+
 def _with_unit_quaternions(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions scaled to norm 1; one of norm 0 or far from 1 is no orientation and becomes NaN."""
-    norms = np.linalg.norm(values[:, 3:7], axis=1, keepdims=True)
-    norms[np.abs(norms - 1.0) > 0.1] = np.nan
-    norms[np.abs(norms - 1.0) < 1e-12] = 1.0  # a second reading changes nothing
+    """Quaternions scaled to norm 1; a pose with one of norm 0 or far from 1 is none and becomes NaN.
+
+    w and one of x, y, z with NaN in the two others: a turn about that axis, and nothing is known of others.
+    Of two numbers otherwise, or three, no turn can be told.
+    """
     unit = np.array(values)
-    unit[:, 3:7] /= norms
+    turns = unit[:, 3:7]
+    known = np.isfinite(turns)
+    one_axis = known[:, 3] & (np.count_nonzero(known[:, :3], axis=1) == 1)
+    turns[~(known.all(axis=1) | one_axis)] = np.nan
+    norms = np.sqrt(np.nansum(turns**2, axis=1, keepdims=True))
+    told = np.isfinite(turns[:, 3])
+    unit[told & (np.abs(norms[:, 0] - 1.0) > 0.1)] = np.nan
+    norms[~told] = np.nan
+    norms[np.abs(norms - 1.0) < 1e-12] = 1.0  # a second reading changes nothing
+    turns /= norms
     return unit

@@ -48,10 +48,12 @@ def limits(values: NDArray[np.float64]) -> list[Limit]:
     Parameters
     ----------
     values : (n, width)
-        Finite samples in order of time.
+        Samples in order of time; NaN: not measured.
     """
     out = []
-    for k, column in enumerate(values.T):
+    for k, whole in enumerate(values.T):
+        known = np.isfinite(whole)
+        column = whole[known]
         levels, counts = np.unique(column, return_counts=True)
         if len(levels) < _DISTINCT:
             continue
@@ -59,7 +61,14 @@ def limits(values: NDArray[np.float64]) -> list[Limit]:
             stuck = column == level
             if level != 0.0 and count >= max(_RUN, _CREST * below) and _longest_run(stuck) >= _RUN:
                 reached = stuck | _within_reach(column, float(level), stuck, upper=level == levels[-1])
-                out.append(Limit(k, float(level), stuck, reached))
+                out.append(Limit(k, float(level), _among(known, stuck), _among(known, reached)))
+    return out
+
+
+def _among(known: NDArray[np.bool_], flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) flags of the known samples among all of them."""
+    out = np.zeros(known.size, bool)
+    out[known] = flags
     return out
 
 

@@ -44,7 +44,8 @@ def _cleaned(raw: RawRecording, rig: Rig, namespace: str) -> Recording:
 
 
 def _usable(raw: RawRecording, rig: Rig, namespace: str) -> Recording:
-    channels = [clean_channel(channel, raw.where) for channel in raw.channels]
+    moving = raw.kind == "dynamic"
+    channels = [clean_channel(channel, raw.where, moving=moving) for channel in raw.channels]
     if all(channel.topic.channel == "ground_truth" for channel in channels):
         known = ", ".join(sorted(raw.listed)) or "none"
         raise InputError(

@@ -55,14 +55,17 @@ def check_rest(recording: Recording, rig: Rig, where: str) -> None:
 def first_motion(recording: Recording, rig: Rig) -> str | None:
     """What swings or drifts beyond its limit, by how much; None where the body hangs at rest."""
     for signal in _signals(recording, rig):
-        motion = slow_motion(signal.series.time, signal.series.values[:, signal.columns])
-        axis = int(np.argmax(motion))
-        if motion[axis] > signal.limit:
-            label = f"{signal.name} {'xyz'[axis]}" if motion.size > 1 else signal.name
-            return (
-                f"{label} varies by {motion[axis]:.3g} {signal.unit} rms, "
-                f"limit {signal.limit:.3g} {signal.unit}"
-            )
+        for part in signal.series.parts(signal.columns):
+            motion = slow_motion(part.series.time, part.series.values)
+            largest = int(np.argmax(motion))
+            if motion[largest] > signal.limit:
+                width = signal.series.values[:, signal.columns].shape[1]
+                axis = part.components[largest] % 3
+                label = f"{signal.name} {'xyz'[axis]}" if width > 1 else signal.name
+                return (
+                    f"{label} varies by {motion[largest]:.3g} {signal.unit} rms, "
+                    f"limit {signal.limit:.3g} {signal.unit}"
+                )
     return None
 
 
@@ -111,9 +114,17 @@ def _signals(recording: Recording, rig: Rig) -> Iterator[_Signal]:
 
 
 def _turning(mocap: Series) -> Series:
-    """(n, 3) small rotations in rad from the first pose: twice the vector part of conj(q_first) q."""
-    q = mocap.values[:, 3:7]
-    vector, scalar = q[0, :3], q[0, 3]
-    relative = scalar * q[:, :3] - q[:, 3:] * vector - np.cross(vector, q[:, :3])
-    sign = np.sign(q @ q[0])[:, None]
-    return Series(mocap.time, 2.0 * sign * relative)
+    """(n, 3) small rotations in rad from the first pose: twice the vector part of conj(q_first) q.
+
+    Of a turn that is told about one axis alone nothing is known about the two others (NaN).
+    """
+    known = np.isfinite(mocap.values[:, 3:7])
+    turned = known[:, 3]
+    out = np.full((mocap.time.size, 3), np.nan)
+    if turned.any():
+        q = np.where(known, mocap.values[:, 3:7], 0.0)[turned]
+        vector, scalar = q[0, :3], q[0, 3]
+        relative = scalar * q[:, :3] - q[:, 3:] * vector - np.cross(vector, q[:, :3])
+        sign = np.sign(q @ q[0])[:, None]
+        out[turned] = np.where(known[turned, :3], 2.0 * sign * relative, np.nan)
+    return Series(mocap.time, out)

@@ -46,7 +46,7 @@ def _powers(problem: Problem, evaluation: Evaluation) -> dict[Axis, list[Array]]
     power: dict[Axis, list[Array]] = {}
     for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
         for index, channel in enumerate(run.channels):
-            for axis in range(channel.width):
+            for axis in channel.axes:
                 rows = linearised.residual[(linearised.channel == index) & (linearised.axis == axis)]
                 if rows.size < 8:
                     continue
@@ -84,7 +84,7 @@ def reweighted(problem: Problem, evaluation: Evaluation) -> Problem:
     for run in problem.runs:
         channels = []
         for c in run.channels:
-            scale = np.array([factors.get((c.device, c.quantity, a), 1.0) for a in range(c.width)])
+            scale = np.array([factors.get((c.device, c.quantity, a), 1.0) for a in c.axes])
             channels.append(replace(c, noise=c.noise * scale))
         runs.append(replace(run, channels=tuple(channels)))
     rests = []

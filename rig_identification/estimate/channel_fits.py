@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.evidence import AXES, Channel, Run, axis_name
 from rig_identification.estimate.lag import lagged
 from rig_identification.estimate.prediction import Linearised, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
@@ -49,15 +49,15 @@ def _axes(recording: str, channel: Channel, predicted: Array, offset: float) -> 
             recording,
             channel.device,
             channel.quantity,
-            "xyz"[a] if channel.width > 1 else None,
+            channel.axis_name(axis),
             channel.unit,
-            float(channel.noise[a]),
+            float(channel.noise[k]),
             channel.noise_estimated,
             channel.time + offset,
-            channel.values[:, a],
-            predicted[:, a],
+            channel.values[:, k],
+            predicted[:, k],
         )
-        for a in range(channel.width)
+        for k, axis in enumerate(channel.axes)
     ]
 
 
@@ -66,13 +66,13 @@ def rest_fits(evidence: RestEvidence, rest: RestLinearised) -> list[ChannelFit]:
     fits = []
     middle = np.array([0.5 * evidence.recording.duration])
     for channel, predicted in zip(evidence.channels, rest.predicted, strict=True):
-        for a in range(channel.mean.size):
+        for a, component in enumerate(channel.components):
             fits.append(
                 ChannelFit(
                     evidence.recording.name,
                     channel.device,
                     channel.quantity,
-                    "xyz"[a] if channel.mean.size > 1 else None,
+                    axis_name(channel.quantity, component % AXES),
                     channel.unit,
                     float(np.sqrt(channel.variance[a])),
                     False,

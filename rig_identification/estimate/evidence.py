@@ -22,7 +22,7 @@ from rig_identification.estimate.sampling import (
     worst_cubic_error,
 )
 from rig_identification.estimate.smooth_force import smooth_force
-from rig_identification.recording import Recording, Series
+from rig_identification.recording import Part, Recording, Series
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -54,13 +54,30 @@ UNHEARD = 0.2
 BESIDE_JUMP, LEFT = 3.0, 0.5
 
 
+#: Components of a quantity that has a direction; those of a device's quantities stand one after the other.
+AXES = 3
+
+
+def columns_of(components: tuple[int, ...]) -> slice | Index:
+    """Columns of a device's reading: a slice where they lie side by side, of which a view is enough."""
+    first, last = components[0], components[-1]
+    if last - first + 1 == len(components):
+        return slice(first, last + 1)
+    return np.array(components, dtype=np.int64)
+
+
+def axis_name(quantity: str, axis: int) -> str | None:
+    """``x``, ``y`` or ``z``; a tension has no axes."""
+    return None if quantity == "tension" else "xyz"[axis]
+
+
 @dataclass(frozen=True)
 class Channel:
     """Samples of one device quantity, grouped by node."""
 
     device: str  # cable name, "imu", "inclinometer" or "mocap"
     quantity: str
-    columns: slice  # of the device's reading (model/sensors.py)
+    components: tuple[int, ...]  # of the device's reading (model/sensors.py), ascending
     unit: str
     time: Array  # (n,) s, device clock
     values: Array  # (n, w)
@@ -73,7 +90,26 @@ class Channel:
     @property
     def width(self) -> int:
         """Number of axes."""
-        return int(self.values.shape[1])
+        return len(self.components)
+
+    @cached_property
+    def columns(self) -> slice | Index:
+        """Where its components stand in the device's reading."""
+        return columns_of(self.components)
+
+    @property
+    def key(self) -> tuple[str, str, tuple[int, ...]]:
+        """What it measures, in every run."""
+        return self.device, self.quantity, self.components
+
+    @cached_property
+    def axes(self) -> tuple[int, ...]:
+        """Which axis (0, 1, 2) each of its components is of."""
+        return tuple(c % AXES for c in self.components)
+
+    def axis_name(self, axis: int) -> str | None:
+        """``x``, ``y`` or ``z`` of one of its axes; a tension has none."""
+        return axis_name(self.quantity, axis)
 
     @cached_property
     def in_order(self) -> bool:
@@ -169,16 +205,26 @@ class Run:
         return tuple(parts)
 
 
-def _channel(
-    rig: Rig, grid: Grid, device: str, quantity: str, unit: str, noise: str, series: Series, columns: slice
+def _channels(
+    rig: Rig, grid: Grid, device: str, quantity: str, unit: str, series: Series, columns: slice
+) -> list[Channel]:
+    """One channel for each part of a quantity that is measured together; none where nothing is."""
+    name = f"{device}_{quantity}" if device == "mocap" else quantity
+    parts = [_part_channel(rig, grid, device, quantity, unit, name, part) for part in series.parts(columns)]
+    return [channel for channel in parts if channel is not None]
+
+
+def _part_channel(
+    rig: Rig, grid: Grid, device: str, quantity: str, unit: str, noise: str, part: Part
 ) -> Channel | None:
+    series = part.series
     inside = (series.time >= MARGIN) & (series.time <= grid.duration - MARGIN)
     if np.count_nonzero(inside) < 5:
         return None
     time, values = series.time[inside], series.values[inside]
     std, estimated = noise_std(rig, noise, time, values)
     group, node = group_by_node(grid, time)
-    return Channel(device, quantity, columns, unit, time, values, std, estimated, group, node)
+    return Channel(device, quantity, part.components, unit, time, values, std, estimated, group, node)
 
 
 def heard_apart(rig: Rig, part: Run) -> Run:
@@ -199,10 +245,18 @@ def heard_apart(rig: Rig, part: Run) -> Run:
 
 
 def _mocap_series(series: Series) -> tuple[Series, Array]:
-    """Pose as position and rotation vector about the mean orientation, and that mean (3, 3)."""
-    turns = Rotation.from_quat(series.values[:, 3:])
-    mean = turns.mean()
-    about_mean = (mean.inv() * turns).as_rotvec()
+    """Pose as position and rotation vector about the mean orientation, and that mean (3, 3).
+
+    A turn about one axis of the tracker alone is a rotation vector along that axis.
+    """
+    quaternions = series.values[:, 3:]
+    known = np.isfinite(quaternions)
+    turned = known[:, 3] & known[:, :3].any(axis=1)
+    about_mean, mean = np.full((series.time.size, 3), np.nan), Rotation.identity()
+    if turned.any():
+        turns = Rotation.from_quat(np.where(known, quaternions, 0.0)[turned])
+        mean = turns.mean()
+        about_mean[turned] = np.where(known[turned, :3], (mean.inv() * turns).as_rotvec(), np.nan)
     return Series(series.time, np.concatenate([series.values[:, :3], about_mean], axis=1)), mean.as_matrix()
 
 
@@ -211,12 +265,21 @@ def node_step(rig: Rig, recording: Recording) -> float:
     fast = (recording.imu, recording.exciter_force, recording.inclination)
     if not recording.tension and all(series is None for series in fast):
         return WATCHED_NODE_STEP
+    if _only_turns(recording) and _all_follow(rig, recording, WATCHED_NODE_STEP):
+        return WATCHED_NODE_STEP
     held = _force_step(rig, recording)
     if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
         return held
     if recording.duration > LONG_RUN or _all_follow(rig, recording, WIDE_NODE_STEP):
         return WIDE_NODE_STEP
     return NODE_STEP
+
+
+def _only_turns(recording: Recording) -> bool:
+    """Whether nothing that shows a jolt or a force is measured, a gyroscope at most."""
+    quick = (recording.exciter_force, recording.inclination)
+    jolts = recording.imu is not None and bool(recording.imu.parts(slice(3, 6)))
+    return not recording.tension and all(series is None for series in quick) and not jolts
 
 
 def _force_step(rig: Rig, recording: Recording) -> float:
@@ -229,9 +292,9 @@ def _all_follow(rig: Rig, recording: Recording, step: float) -> bool:
     """Whether a cubic through nodes ``step`` apart follows tensions, rates and specific forces."""
     follows = [_follows(rig, "tension", series, step) for series in recording.tension.values()]
     if recording.imu is not None:
-        time, values = recording.imu.time, recording.imu.values
-        follows.append(_follows(rig, "angular_rate", Series(time, values[:, :3]), step))
-        follows.append(_follows(rig, "specific_force", Series(time, values[:, 3:]), step))
+        for name, columns in (("angular_rate", slice(0, 3)), ("specific_force", slice(3, 6))):
+            parts = recording.imu.parts(columns)
+            follows += [_follows(rig, name, part.series, step) for part in parts]
     return all(follows)
 
 
@@ -277,29 +340,21 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
     """Everything of a dynamic recording that a fit needs. step: between nodes, s (none: what it takes)."""
     step = step or node_step(rig, recording)
     grid = Grid(step, int(np.floor(recording.duration / step)) + 1)
-    found: list[Channel | None] = []
+    found: list[Channel] = []
     for cable, series in recording.tension.items():
-        found.append(_channel(rig, grid, cable, "tension", "N", "tension", series, slice(0, 1)))
+        found += _channels(rig, grid, cable, "tension", "N", series, slice(0, 1))
     if recording.imu is not None and rig.imu is not None:
-        series = recording.imu
-        gyro, accel = Series(series.time, series.values[:, :3]), Series(series.time, series.values[:, 3:])
-        found.append(_channel(rig, grid, "imu", "angular_rate", "rad/s", "angular_rate", gyro, slice(0, 3)))
-        found.append(
-            _channel(rig, grid, "imu", "specific_force", "m/s^2", "specific_force", accel, slice(3, 6))
-        )
+        found += _channels(rig, grid, "imu", "angular_rate", "rad/s", recording.imu, slice(0, 3))
+        found += _channels(rig, grid, "imu", "specific_force", "m/s^2", recording.imu, slice(3, 6))
     if recording.inclination is not None and rig.inclinometer is not None:
-        series = recording.inclination
-        found.append(
-            _channel(rig, grid, "inclinometer", "inclination", "rad", "inclination", series, slice(0, 2))
+        found += _channels(
+            rig, grid, "inclinometer", "inclination", "rad", recording.inclination, slice(0, 2)
         )
     mean = None
     if recording.mocap is not None:
         series, mean = _mocap_series(recording.mocap)
-        place, turn = Series(series.time, series.values[:, :3]), Series(series.time, series.values[:, 3:])
-        found.append(_channel(rig, grid, "mocap", "position", "m", "mocap_position", place, slice(0, 3)))
-        found.append(
-            _channel(rig, grid, "mocap", "orientation", "rad", "mocap_orientation", turn, slice(3, 6))
-        )
+        found += _channels(rig, grid, "mocap", "position", "m", series, slice(0, 3))
+        found += _channels(rig, grid, "mocap", "orientation", "rad", series, slice(3, 6))
     exciter = recording.exciter_force if rig.exciter is not None else None
     noise, rate, force = 0.0, 1.0, None
     unknown: tuple[tuple[float, float], ...] = ()
@@ -312,7 +367,7 @@ def prepare(rig: Rig, recording: Recording, step: float | None = None) -> Run:
         force = replace(node_input(grid, known.time, known.values, noise), doubt=known.variance)
         if not (unknown or np.any(force.doubt) or np.any(force.jumps)):
             force = smooth_force(grid, exciter.time, exciter.values, std) or force
-    channels = tuple(c for c in found if c is not None)
+    channels = tuple(found)
     run = Run(recording, grid, channels, force, noise, rate, mean, unknown=unknown)
     if not run.watched:
         run = replace(run, R_tracker_mean=None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -92,6 +94,51 @@ def rest_of(model: RigModel) -> State:
     return settle(model, design_pose(model))
 
 
+@dataclass(frozen=True)
+class SeenPose:
+    """What a tracker sees of a run, each component where it was measured; 0 where it never was."""
+
+    time: Array  # (n,) s
+    values: Array  # (n, 6) position m, rotation vector about the mean orientation rad
+    known: NDArray[np.bool_]  # (6,) which of them the tracker measures
+
+    @property
+    def position(self) -> Array:
+        """(n, 3) m, tracker frame."""
+        return self.values[:, :3]
+
+    @property
+    def turn(self) -> Array:
+        """(n, 3) rad, marker axes at the mean orientation."""
+        return self.values[:, 3:]
+
+    @property
+    def turned(self) -> bool:
+        """Whether the tracker tells anything of the attitude."""
+        return bool(np.any(self.known[3:]))
+
+
+def seen_pose(run: Run) -> SeenPose | None:
+    """What the run's tracker sees; None without one."""
+    parts = sorted((c for c in run.channels if c.device == "mocap"), key=lambda c: -c.time.size)
+    if not parts or run.R_tracker_mean is None:
+        return None
+    time = parts[0].time
+    values, known = np.zeros((time.size, 6)), np.zeros(6, dtype=bool)
+    for part in parts:
+        for k, component in enumerate(part.components):
+            if not known[component]:
+                values[:, component] = np.interp(time, part.time, part.values[:, k])
+                known[component] = True
+    return SeenPose(time, values, known)
+
+
+def seen_whole(run: Run) -> bool:
+    """Whether the run's tracker measures place and attitude, all of both."""
+    seen = seen_pose(run)
+    return seen is not None and bool(np.all(seen.known))
+
+
 def headings(rig: Rig, run: Run) -> list[float]:
     """Candidate angles (rad) of world x about the tracker's z.
 
@@ -99,19 +146,20 @@ def headings(rig: Rig, run: Run) -> list[float]:
     horizontal rotation follows the displacement as r = e (n . d)/h, n = z x e, so that e is the
     left singular vector of the regression of r on d. Its sign stays open: a body on two cables swings
     alike turned by half a circle, and the smaller turn comes first. Otherwise eight of a round, or of that
-    part of it after which the rig falls on itself (symmetry.py), about no turn.
+    part of it after which the rig falls on itself (symmetry.py), about no turn. A tracker that tells only
+    attitude, or only height, does not feel which way world x points.
     """
-    if rig.mocap is not None:
+    pose = seen_pose(run)
+    beside = pose is not None and bool(np.any(pose.known[:2]))
+    if not beside or (rig.mocap is not None and pose is not None and pose.turned):
         return [0.0]
-    channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
-    if len(rig.cables) > 2 or run.R_tracker_mean is None or len(channels) < 2:
+    if len(rig.cables) > 2 or pose is None or run.R_tracker_mean is None or not np.all(pose.known):
         seen = all(c.device == "mocap" for c in run.channels)
         part = 2.0 * np.pi / (1 + (sum(turn.exact for turn in turns(rig)) if seen else 0))
         return sorted((part * (k / 8.0) for k in range(-3, 5)), key=abs)
-    place, turn = channels["position"], channels["orientation"]
     # Rotation in tracker axes: the mean orientation carries the vector about it there
-    r = (turn.values @ run.R_tracker_mean.T)[:, :2]
-    d = np.stack([np.interp(turn.time, place.time, place.values[:, i]) for i in range(2)], axis=1)
+    r = (pose.turn @ run.R_tracker_mean.T)[:, :2]
+    d = pose.position[:, :2]
     r, d = r - np.mean(r, axis=0), d - np.mean(d, axis=0)
     slope = np.linalg.lstsq(d, r, rcond=None)[0].T
     e = np.linalg.svd(slope)[0][:, 0]
@@ -124,21 +172,22 @@ def headings(rig: Rig, run: Run) -> list[float]:
 def mocap_mount(rig: Rig, run: Run, rest: State, heading: float) -> sensors.MocapMount:
     """Mounts under which the mean recorded pose is the rest pose.
 
-    Where the marker's mount is not described, the tracker's z is taken to be up, turned by
-    ``heading`` (rad) about it, and the marker to sit at the datum: a start for the fit.
+    Where the marker's mount is not described, or the tracker tells no attitude, the tracker's z is taken to
+    be up, turned by ``heading`` (rad) about it; the marker sits where it is described, else at the datum: a
+    start for the fit.
     """
-    place = next(c for c in run.channels if c.device == "mocap" and c.quantity == "position")
-    if run.R_tracker_mean is None:
+    pose = seen_pose(run)
+    if pose is None or run.R_tracker_mean is None:
         raise ValueError("the run holds no motion capture")
-    mean_position = np.mean(place.values, axis=0)
-    if rig.mocap is not None:
+    mean_position = np.mean(pose.position, axis=0)
+    if rig.mocap is not None and pose.turned:
         R_body_marker = Rotation.from_quat(rig.mocap.orientation).as_matrix()
         marker = rig.mocap.position
         R_tracker_world = run.R_tracker_mean @ R_body_marker.T @ rest.R_world_body.T
     else:
         R_tracker_world = Rotation.from_rotvec([0.0, 0.0, heading]).as_matrix()
         R_body_marker = (R_tracker_world @ rest.R_world_body).T @ run.R_tracker_mean
-        marker = np.zeros(3)
+        marker = np.zeros(3) if rig.mocap is None else rig.mocap.position
     world = mean_position - R_tracker_world @ (rest.position + rest.R_world_body @ marker)
     return sensors.MocapMount(marker, R_body_marker, world, R_tracker_world)
 
@@ -148,15 +197,17 @@ def start_from_mocap(
 ) -> State | None:
     """Pose and velocity at time 0 from lines through the first ``span`` seconds; None without motion capture.
 
+    What the tracker does not measure is taken to be as at rest.
+
     device (12,): current errors of the mount (model/sensors.py).
     """
-    channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
-    if "position" not in channels or "orientation" not in channels or run.R_tracker_mean is None:
+    pose = seen_pose(run)
+    if pose is None or run.R_tracker_mean is None:
         return None
-    place, turn = channels["position"], channels["orientation"]
-    early = place.time <= place.time[0] + span
-    line = np.polynomial.polynomial.polyfit(place.time[early], place.values[early], 1)
-    spin = np.polynomial.polynomial.polyfit(turn.time[early], turn.values[early], 1)
+    early = pose.time <= pose.time[0] + span
+    line, spin = np.split(
+        np.polynomial.polynomial.polyfit(pose.time[early], pose.values[early], 1), 2, axis=1
+    )
     R_bm = Rotation.from_rotvec(device[3:6]).as_matrix() @ mount.R_body_marker
     R_tw = Rotation.from_rotvec(device[9:12]).as_matrix() @ mount.R_tracker_world
     R_tracker_body = run.R_tracker_mean @ Rotation.from_rotvec(spin[0]).as_matrix() @ R_bm.T

@@ -14,7 +14,13 @@ from rig_identification.estimate.channel_fits import rest_fits, run_fits
 from rig_identification.estimate.enough import enough, told
 from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
-from rig_identification.estimate.first_guess import elements_that_hang, mocap_mount, rest_of, weak_prior
+from rig_identification.estimate.first_guess import (
+    elements_that_hang,
+    mocap_mount,
+    rest_of,
+    seen_whole,
+    weak_prior,
+)
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.followable import followable, hanging
 from rig_identification.estimate.growing import (
@@ -24,6 +30,8 @@ from rig_identification.estimate.growing import (
     misfit,
     solve_growing,
 )
+from rig_identification.estimate.hung_by_eye import hung_by_eye
+from rig_identification.estimate.hung_by_eye import note_of as note_of_center
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, unsettled
@@ -51,6 +59,7 @@ from rig_identification.estimate.solve import (
     solve,
 )
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
+from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -110,7 +119,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     problem = Problem(
         Bench(rig, parameters), runs, rests, mass, weak_prior(rig), theta[:INERTIAL].copy(), bound=ORDINARY
     )
-    return problem, theta, held
+    return hung_by_eye(problem), theta, held
 
 
 def _runs_of(rig: Rig, recordings: tuple[Recording, ...]) -> tuple[Run, ...]:
@@ -160,7 +169,7 @@ def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progr
         return Start(problem, launch.from_momentum().point(), launch.rest, held)
     if problem.bench.rig.mocap is not None:
         mount: MocapMount | None = mocap_mount(problem.bench.rig, watched, launch.rest, 0.0)
-    elif any(c.device == "imu" for c in watched.channels):
+    elif any(c.device == "imu" for c in watched.channels) and seen_whole(watched):
         track = tracked(blind.bench, without_mocap(watched).until(REGRESSED), launch.theta, launch.rest)
         mount = None if track is None else mount_from_track(watched, track)
     else:
@@ -232,9 +241,8 @@ def _note(name: str, part: FreePart) -> str:
 
 def only_watched(problem: Problem) -> bool:
     """Whether no device measures force or acceleration: the body is only seen to move."""
-    devices = {c.device for run in problem.runs for c in run.channels}
-    forces = devices & set(problem.bench.parameters.places.cables)
-    return bool(problem.runs) and not forces and "imu" not in devices
+    measured = {c.quantity for run in problem.runs for c in run.channels}
+    return bool(problem.runs) and not measured & FORCES
 
 
 def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
@@ -279,7 +287,7 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
     fitted = fit_from(_begun(problem, theta, held, progress), progress)
-    fitted = replace(fitted, notes=(*told((*problem.runs, *held)), *fitted.notes))
+    fitted = replace(fitted, notes=(*told((*problem.runs, *held)), *note_of_center(problem), *fitted.notes))
     rods = rods_of(session.rig, (*problem.runs, *held))
     fitted = replace(fitted, notes=(*fitted.notes, note_of(rods))) if rods else fitted
     less = without_unseen_force(session, fitted, _surely_driven)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.hung_by_eye import beside_middle
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, left_to_go
 from rig_identification.model.definite import definite, integrated_out
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 
 #: Share of the belief's standard deviation above which an element counts as not determined.
 GAIN = 1.0 / 3.0
+#: The centre of mass among the elements, and where its entries begin in the body's vector.
+CENTER, CENTER_ENTRY = ELEMENTS[1:4], 7
 #: Factor on the noise of a channel that testifies for nothing.
 SILENT = 1e3
 
@@ -70,10 +73,12 @@ def data_information(problem: Problem, evaluation: Evaluation) -> Array:
     """(10, 10) information on the ten elements from recordings and scale alone.
 
     Doubts about the rig and start states are integrated out; the weak prior on the body is
-    taken off. Local and in the elements themselves: that mass must be positive tells
-    nothing here.
+    taken off, but for what is believed of it. Local and in the elements themselves: that mass must be
+    positive tells nothing here.
     """
-    shared = integrated_out(evaluation.information, INERTIAL) - np.diag(1.0 / problem.weak**2)
+    vague = 1.0 / problem.weak**2
+    vague[list(problem.taken)] = 0.0
+    shared = integrated_out(evaluation.information, INERTIAL) - np.diag(vague)
     map_ = np.linalg.inv(problem.bench.parameters.elements_jacobian(evaluation.point.theta))
     return np.asarray(map_.T @ shared @ map_)
 
@@ -82,9 +87,12 @@ def inertial_estimate(problem: Problem, evaluation: Evaluation) -> InertialEstim
     """The ten numbers with their covariance and the names of those that stay undetermined."""
     theta = evaluation.point.theta
     left = share_left(problem, evaluation)
-    lost = tuple(name for name, share in zip(ELEMENTS, left, strict=True) if not share < GAIN)
-    covariance = elements_covariance(problem, evaluation)
-    return InertialEstimate(problem.bench.parameters.elements(theta), covariance, lost)
+    believed = {name for i, name in enumerate(CENTER, start=CENTER_ENTRY) if i in problem.taken}
+    lost = tuple(n for n, share in zip(ELEMENTS, left, strict=True) if n in believed or not share < GAIN)
+    elements = problem.bench.parameters.elements(theta)
+    beside = beside_middle(problem, elements)
+    covariance = elements_covariance(problem, evaluation) + np.outer(beside, beside)
+    return InertialEstimate(elements, covariance, lost)
 
 
 def believed_point(problem: Problem, evaluation: Evaluation) -> Array:
@@ -123,7 +131,7 @@ def testimony(
     for run in problem.runs:
         channels = []
         for c in run.channels:
-            mute = [predicted.get((c.device, c.quantity, a), 0.0) > GAIN for a in range(c.width)]
+            mute = [predicted.get((c.device, c.quantity, a), 0.0) > GAIN for a in c.axes]
             channels.append(replace(c, noise=np.where(mute, SILENT, 1.0) * c.noise))
         runs.append(replace(run, channels=tuple(channels)))
     heard = replace(problem, runs=tuple(runs))

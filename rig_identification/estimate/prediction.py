@@ -43,6 +43,7 @@ class Bench:
     rig: Rig
     parameters: ParameterSet
     mocap: sensors.MocapMount | None = None
+    unseen: bool = False  # nothing that was measured tells how far the body swings (unseen_swing.py)
 
 
 def model_at(parameters: ParameterSet, theta: Array) -> RigModel:
@@ -129,7 +130,7 @@ class Linearised:
     motion: Motion
     nodes: NDArray[np.int64]  # (m,) node of each row
     channel: NDArray[np.int64]  # (m,) index into run.channels
-    axis: NDArray[np.int64]  # (m,) column within the channel
+    axis: NDArray[np.int64]  # (m,) which axis of the channel's quantity
     plain: Array  # (m,) residual before whitening, in the channel's unit
     variance: Array  # (m,) sensor noise of each row
     row_H: Array  # (m, 12 + 2 s) response of each row to the state at its node
@@ -312,7 +313,7 @@ def linearise_run(
         spread = channel.grouped_variance + unsettled(run.grid.step, tau, channel.node, channel.grouped)
         here = places[first : first + spread.size]
         first += spread.size
-        axis[here] = np.tile(np.arange(channel.width), channel.node.size)
+        axis[here] = np.tile(channel.axes, channel.node.size)
         variance[here] = spread.ravel()
         H[here], D[here] = in_state.reshape(spread.size, -1), in_wrench.reshape(spread.size, 6)
         columns[here] = rows.reshape(spread.size, -1)

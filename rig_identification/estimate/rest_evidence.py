@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.evidence import Index, columns_of
 from rig_identification.estimate.force_noise import Discrepancy
 from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.prediction import Bench, read_device
@@ -31,11 +32,16 @@ class RestChannel:
     device: str
     quantity: str
     unit: str
-    columns: slice
+    components: tuple[int, ...]  # of the device's reading
     mean: Array  # (w,)
     variance: Array  # (w,) of the mean
     noise: Array  # (w,) of one sample
     time: Array  # (m,) s after the recording's start, spread over the samples' span
+
+    @property
+    def columns(self) -> slice | Index:
+        """Where its components stand in the device's reading."""
+        return columns_of(self.components)
 
 
 @dataclass(frozen=True)
@@ -65,22 +71,21 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
     """Means of everything that a static recording holds."""
     channels: list[RestChannel] = []
 
-    def add(device: str, quantity: str, unit: str, noise: str, series: Series, columns: slice) -> None:
-        values = series.values
-        std, _ = noise_std(rig, noise, series.time, values)
-        mean, variance = np.mean(values, axis=0), mean_variance(values, std)
-        time = np.linspace(series.time[0], series.time[-1], SPREAD)
-        channels.append(RestChannel(device, quantity, unit, columns, mean, variance, std, time))
+    def add(device: str, quantity: str, unit: str, measured: Series, columns: slice) -> None:
+        for part in measured.parts(columns):
+            series = part.series
+            std, _ = noise_std(rig, quantity, series.time, series.values)
+            mean, variance = np.mean(series.values, axis=0), mean_variance(series.values, std)
+            time = np.linspace(series.time[0], series.time[-1], SPREAD)
+            channels.append(RestChannel(device, quantity, unit, part.components, mean, variance, std, time))
 
     for cable, series in recording.tension.items():
-        add(cable, "tension", "N", "tension", series, slice(0, 1))
+        add(cable, "tension", "N", series, slice(0, 1))
     if recording.imu is not None and rig.imu is not None:
-        time, values = recording.imu.time, recording.imu.values
-        rate, force = Series(time, values[:, :3]), Series(time, values[:, 3:])
-        add("imu", "angular_rate", "rad/s", "angular_rate", rate, slice(0, 3))
-        add("imu", "specific_force", "m/s^2", "specific_force", force, slice(3, 6))
+        add("imu", "angular_rate", "rad/s", recording.imu, slice(0, 3))
+        add("imu", "specific_force", "m/s^2", recording.imu, slice(3, 6))
     if recording.inclination is not None and rig.inclinometer is not None:
-        add("inclinometer", "inclination", "rad", "inclination", recording.inclination, slice(0, 2))
+        add("inclinometer", "inclination", "rad", recording.inclination, slice(0, 2))
     return RestEvidence(recording, recording.dummy, tuple(channels))
 
 

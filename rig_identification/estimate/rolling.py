@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.hung_by_eye import TURNS
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.side_by_side import side_by_side
@@ -79,7 +80,7 @@ def ways_of_rolling(problem: Problem, pieces: tuple[Run, ...], theta: Array, res
     the product of their mean squares.
     """
     line = line_of_hinges(problem.bench.rig)
-    if line is None or not pieces:
+    if line is None or not any(_tell(piece) for piece in pieces):
         return []
     span = float(np.mean([piece.grid.duration for piece in pieces]))
     bodies = _bodies(problem, theta, line, span)
@@ -87,6 +88,11 @@ def ways_of_rolling(problem: Problem, pieces: tuple[Run, ...], theta: Array, res
     around = np.concatenate([[np.inf], left, [np.inf]])
     lowest = np.flatnonzero((left < around[:-2]) & (left <= around[2:]))
     return [bodies[k] for k in lowest[np.argsort(left[lowest])][:TRIED]]
+
+
+def _tell(piece: Run) -> bool:
+    """Whether a piece measures more than a turn about one's own z, which feels no rolling."""
+    return any(c.quantity not in TURNS or c.axes != (2,) for c in piece.channels)
 
 
 def _left(problem: Problem, pieces: tuple[Run, ...], theta: Array, rest: State) -> float:
@@ -104,6 +110,7 @@ def _left(problem: Problem, pieces: tuple[Run, ...], theta: Array, rest: State) 
         if found is None:
             return np.inf
         run = found[0]
-        left = doubts.cost(run) - run.log_spread
+        # Within the noise one way of rolling is as good as another
+        left = max(doubts.cost(run) - run.log_spread, 0.5 * run.residual.size)
         total += 0.5 * run.residual.size * float(np.log(2.0 * left / run.residual.size))
     return total

@@ -8,6 +8,7 @@ state, lands inside the basin.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.solve import ROUNDING, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
+from rig_identification.estimate.swing_period import long_enough
 from rig_identification.model.motion import State
 from rig_identification.model.sensors import MOCAP_SIZE
 
@@ -27,6 +29,9 @@ Array = NDArray[np.float64]
 #: Inertia as a multiple of the first guess, and depth as a share of the rig's extent.
 SIZES = tuple(float(s) for s in np.geomspace(0.3, 4.0, 9))
 DEPTHS = (0.05, 0.15, 0.4)
+#: From one of the sizes to the next, and how often the scan goes on beyond them while the best is the last:
+#: each time by a factor of 3.6.
+RATIO, FARTHER = SIZES[1] / SIZES[0], 4
 #: Piece that the scan looks at, s, taken from the middle of the second half of a run.
 SCANNED = 4.0
 #: Share of the weak prior's std within which the brief fit may move from the scan's best.
@@ -42,8 +47,28 @@ class Scanned:
     rest: State
 
 
-def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], depths, sizes):  # type: ignore[no-untyped-def]
-    """Yield (bench, theta, rest, start, heading) over headings, depths and sizes."""
+@dataclass(frozen=True)
+class _Tried:
+    """One body under one heading, and how it fits from its best start."""
+
+    bench: Bench
+    theta: Array
+    rest: State
+    start: State
+    heading: float
+    size: float
+    cost: float = np.inf
+
+
+def _tried(
+    problem: Problem,
+    whole: Run,
+    piece: Run,
+    headings_: Sequence[float],
+    depths: Sequence[float],
+    sizes: Sequence[float],
+) -> Iterator[_Tried]:
+    """Every heading, depth and size, not yet fitted."""
     parameters, rig = problem.bench.parameters, problem.bench.rig
     first = parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))
     size = float(np.max(extent(rig)))
@@ -63,20 +88,38 @@ def _tried(problem: Problem, whole: Run, piece: Run, headings_: list[float], dep
                 if bench.mocap is not None:
                     model = model_at(parameters, theta)
                     start = start_from_mocap(model, piece, bench.mocap, np.zeros(MOCAP_SIZE))
-                yield bench, theta, rest, rest if start is None else start, heading
+                yield _Tried(bench, theta, rest, rest if start is None else start, heading, scale)
 
 
-def _best(piece: Run, tried):  # type: ignore[no-untyped-def]
-    """The one of (bench, theta, rest, start, heading) that fits best, with its own best start.
+def _best(piece: Run, tried: Iterable[_Tried]) -> _Tried | None:
+    """The one of what is tried that fits best, with its own best start; None where none can be followed.
 
     Of those that no recording tells apart the first one: rounding is no reason.
     """
-    best, kept = np.inf, None
-    for bench, theta, rest, start, heading in tried:
-        found = fit_start(bench, piece, theta, start, tolerance=1.0, iterations=6)
-        if found is not None and (kept is None or found[0].cost < best - ROUNDING * abs(best)):
-            best, kept = found[0].cost, (bench, theta, rest, found[1], heading)
-    return kept
+    best: _Tried | None = None
+    for one in tried:
+        found = fit_start(one.bench, piece, one.theta, one.start, tolerance=1.0, iterations=6)
+        if found is not None and (best is None or found[0].cost < best.cost - ROUNDING * abs(best.cost)):
+            best = replace(one, start=found[1], cost=found[0].cost)
+    return best
+
+
+def _of_any_size(problem: Problem, half: Run, piece: Run, heading: float) -> _Tried | None:
+    """The best over depths and SIZES, and over smaller or larger ones while the best is the last of them."""
+    sizes: Sequence[float] = SIZES
+    best: _Tried | None = None
+    for _ in range(FARTHER):
+        found = _best(piece, _tried(problem, half, piece, [heading], DEPTHS, sizes))
+        if found is None or (best is not None and not found.cost < best.cost):
+            break
+        best = found
+        if best.size == max(sizes) >= SIZES[-1]:
+            sizes = [best.size * RATIO**k for k in range(1, 5)]
+        elif best.size == min(sizes) <= SIZES[0]:
+            sizes = [best.size / RATIO**k for k in range(1, 5)]
+        else:
+            break
+    return best
 
 
 def scan(problem: Problem, run: Run) -> Scanned | None:
@@ -86,15 +129,14 @@ def scan(problem: Problem, run: Run) -> Scanned | None:
     """
     nodes = run.grid.nodes
     half = run.between(nodes // 2, nodes - 1)
-    piece = half.until(SCANNED)
+    piece = half.until(long_enough(half, SCANNED))
     all_headings = headings(problem.bench.rig, half) if half.R_tracker_mean is not None else [0.0]
     kept = _best(piece, _tried(problem, half, piece, all_headings, DEPTHS[1:2], SIZES[::2]))
     if kept is not None:
-        kept = _best(piece, _tried(problem, half, piece, [kept[4]], DEPTHS, SIZES))
+        kept = _of_any_size(problem, half, piece, kept.heading)
     if kept is None:
         return None
-    bench, theta, rest, start, _ = kept
-    settled = replace(problem, bench=bench, runs=(run,), weak_center=theta[:INERTIAL].copy())
+    settled = replace(problem, bench=kept.bench, runs=(run,), weak_center=kept.theta[:INERTIAL].copy())
     brief = replace(settled, runs=(piece,), rests=(), weak=NEAR * problem.weak)
-    evaluation, _ = solve(brief, Point(theta, (start,), ()), iterations=25, tolerance=0.5)
-    return Scanned(settled, evaluation.point.theta, rest)
+    evaluation, _ = solve(brief, Point(kept.theta, (kept.start,), ()), iterations=25, tolerance=0.5)
+    return Scanned(settled, evaluation.point.theta, kept.rest)

@@ -15,13 +15,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.launch import launch_state, launch_states
+from rig_identification.estimate.noise import FITTED_SAMPLES
 from rig_identification.estimate.prediction import linearise_run
-from rig_identification.estimate.sampling import LOCAL, sample_noise_std
+from rig_identification.estimate.sampling import sample_noise_std
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import CannotBeFollowed, Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
+from rig_identification.estimate.swing_period import beside_a_swing, long_enough, swing_period
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -39,13 +41,17 @@ def pieces_of(run: Run, length: float = PIECE) -> tuple[Run, ...]:
 
 
 def in_pieces(
-    problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...], length: float = PIECE
+    problem: Problem, theta: Array, rest: State, rest_guesses: tuple[State, ...], times: float = 1.0
 ) -> tuple[Problem, Point]:
     """The same problem with every run in pieces, and a point with a start state for each.
 
+    times: how many times as long as a piece has to be. Where nothing but the motion is measured that is as
+    long as some swings take, and PIECE otherwise.
     Pieces that the model cannot follow at ``theta`` are left out. Raises CannotBeFollowed where none is left.
     """
-    cut = tuple(piece for run in problem.runs for piece in pieces_of(run, length) if piece.channels)
+    lengths = [times * long_enough(run, PIECE) for run in problem.runs]
+    pieces = (pieces_of(run, length) for run, length in zip(problem.runs, lengths, strict=True))
+    cut = tuple(piece for of_run in pieces for piece in of_run if piece.channels)
     starts = launch_states(problem.bench, cut, theta, rest)
 
     def follows(begun: tuple[Run, State]) -> bool:
@@ -94,9 +100,10 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
     """Find the free stretch: short pieces are fitted by start states alone, and the bad ones are driven.
 
     The yardstick is the better half of the pieces. A piece at rest fits always and says nothing; what the
-    model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand.
+    model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand. Nor
+    is what noise leaves of a piece, however well others fit.
     """
-    cut = pieces_of(run, SHORT_PIECE)
+    cut = pieces_of(run, SHORT_PIECE / PIECE * long_enough(run, PIECE))
     errors = np.full(len(cut), np.inf)
     swing = _swing(run, cut)
     for i, piece in enumerate(cut):
@@ -104,7 +111,7 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
         if fitted is not None:
             errors[i] = float(np.sqrt(np.mean(fitted[0].residual ** 2)))
     shares = errors / swing
-    driven = (errors > DRIVEN * _calm(errors)) & (shares > DRIVEN * _calm(shares))
+    driven = (errors > DRIVEN * max(_calm(errors), 1.0)) & (shares > DRIVEN * _calm(shares))
     best, begin = (0, 0), 0
     for i in range(len(cut) + 1):
         if i == len(cut) or driven[i]:
@@ -130,10 +137,10 @@ def _calm(errors: Array) -> float:
 
 def _swing(run: Run, cut: tuple[Run, ...]) -> Array:
     """(pieces,) root mean square distance of each piece from the run's middle, in units of noise."""
-    middle = {(c.device, c.quantity): np.median(c.values, axis=0) for c in run.channels}
+    middle = {c.key: np.median(c.values, axis=0) for c in run.channels}
     out = []
     for piece in cut:
-        off = [(c.values - middle[c.device, c.quantity]) / c.noise for c in piece.channels]
+        off = [(c.values - middle[c.key]) / c.noise for c in piece.channels]
         out.append(np.sqrt(np.mean(np.concatenate([o.ravel() for o in off]) ** 2)))
     return np.asarray(np.maximum(np.array(out), 1e-12))
 
@@ -143,28 +150,19 @@ def with_noise_of_swing(run: Run) -> Run:
 
     Neighbouring samples show a tracker's white noise alone. What wanders with the pose (markers
     hidden and found again, lens errors) is noise as well: all that a cubic over a quarter of
-    the swing's period does not follow.
+    the swing's period does not follow; of samples too seldom for that, all that no swing follows.
     """
-    period = _period(run)
+    period = swing_period(run)
+
+    def heard(c: Channel) -> Array:
+        often = c.time.size / run.grid.duration * 0.25 * period > FITTED_SAMPLES
+        if often:
+            return sample_noise_std(c.time, c.values, 0.25 * period)
+        return beside_a_swing(c.time, c.values, period)
+
     return replace(
         run,
         channels=tuple(
-            replace(c, noise=np.maximum(c.noise, sample_noise_std(c.time, c.values, 0.25 * period)))
-            if c.noise_estimated
-            else c
-            for c in run.channels
+            replace(c, noise=np.maximum(c.noise, heard(c))) if c.noise_estimated else c for c in run.channels
         ),
     )
-
-
-def _period(run: Run) -> float:
-    """Period (s) of the strongest line, each axis in units of its noise."""
-    best, period = 0.0, LOCAL
-    for c in run.channels:
-        step = (c.time[-1] - c.time[0]) / max(c.time.size - 1, 1)
-        centred = (c.values - np.mean(c.values, axis=0)) / c.noise
-        power = np.abs(np.fft.rfft(centred * np.hanning(c.time.size)[:, None], axis=0))
-        line = int(np.argmax(np.max(power[1:], axis=1))) + 1
-        if np.max(power[line]) > best:
-            best, period = float(np.max(power[line])), step * c.time.size / line
-    return max(period, LOCAL)

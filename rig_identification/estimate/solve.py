@@ -32,6 +32,7 @@ from rig_identification.estimate.rest_evidence import (
     with_dummy,
 )
 from rig_identification.estimate.side_by_side import side_by_side
+from rig_identification.estimate.unseen_swing import swing_belief
 from rig_identification.model import layout
 from rig_identification.model.definite import definite
 from rig_identification.model.equilibrium import settle
@@ -62,6 +63,7 @@ class Problem:
     stride: float = LONGEST_STEP  # longest step of the body, in std of the weak prior
     extra_noise: Array | None = None  # (6, 6) random wrench over a node interval: what the model lacks
     discrepancy: Discrepancy | None = None  # ... as a wrench that goes on, at rest as well
+    taken: tuple[int, ...] = ()  # entries of the weak prior that are believed (hung_by_eye.py)
 
 
 @dataclass(frozen=True)
@@ -191,6 +193,12 @@ def _assemble(
         information[np.ix_(columns, columns)] += run.jacobian.T @ run.jacobian
         gradient[columns] += run.jacobian.T @ run.residual
         cost += run.cost
+        if problem.bench.unseen:
+            basis = start_basis(model_at(problem.bench.parameters, point.theta), start)
+            belief = swing_belief(problem.bench.rig, start, basis)
+            cost += belief[0]
+            information[np.ix_(columns[p:], columns[p:])] += belief[1]
+            gradient[columns[p:]] += belief[2]
         place += starts
     for rest in rests:
         information[:p, :p] += rest.jacobian.T @ rest.jacobian

@@ -17,8 +17,9 @@ from rig_identification.estimate.prediction import (
     model_at,
     start_basis,
 )
+from rig_identification.estimate.unseen_swing import swing_belief
 from rig_identification.model import layout
-from rig_identification.model.motion import State, on_cables
+from rig_identification.model.motion import RigModel, State, on_cables
 
 Array = NDArray[np.float64]
 
@@ -102,8 +103,9 @@ def fit_start(
     doubts = Doubts(p, doubted)
     for _ in range(iterations):
         information, gradient = doubts.eliminated(current)
-        information = information + np.diag(weight)
-        gradient = gradient - weight * moved_so_far
+        believed, inside, pull = _belief(bench, model, start)
+        information = information + np.diag(weight) + inside
+        gradient = gradient - weight * moved_so_far + pull
         damped = information + damping * np.diag(np.diag(information))
         change = np.linalg.lstsq(damped, gradient, rcond=1e-12)[0]
         if 0.5 * float(change @ gradient) < tolerance:
@@ -112,6 +114,7 @@ def fit_start(
         trial = attempt(moved)
         further = moved_so_far + change
         prior_change = 0.5 * float(weight @ (further**2 - moved_so_far**2))
+        prior_change += _belief(bench, model, moved)[0] - believed
         if trial is not None and trial.jacobian.shape[1] - p != further.size:
             # Cables of which more than needed hold the body leave it other freedoms there: none is known of
             further, prior_change = np.zeros(trial.jacobian.shape[1] - p), 0.0
@@ -128,6 +131,11 @@ def fit_start(
             if damping > 1e6:
                 break
     return current, start
+
+
+def _belief(bench: Bench, model: RigModel, start: State) -> tuple[float, Array | float, Array | float]:
+    """Cost, information and negative gradient of what is believed of a swing that nothing measures."""
+    return swing_belief(bench.rig, start, start_basis(model, start)) if bench.unseen else (0.0, 0.0, 0.0)
 
 
 def _weight(size: int, inner: int, spread: float) -> Array:

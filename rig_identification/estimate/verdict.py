@@ -46,10 +46,10 @@ def residual_witnesses(run: Run, linearised: Linearised, residual: Array) -> lis
     """Band powers of every channel of a run. residual (m,): whitened, in the rows of ``linearised``."""
     out = []
     for index, channel in enumerate(run.channels):
-        for a in range(channel.width):
+        for a in channel.axes:
             rows = (linearised.channel == index) & (linearised.axis == a)
             rate = (np.count_nonzero(rows) - 1) / max(float(np.ptp(channel.time)), 1e-9)
-            axis = "xyz"[a] if channel.width > 1 else None
+            axis = channel.axis_name(a)
             out += [
                 Witness(run.recording.name, channel.device, axis, band)
                 for band in bands(residual[rows], rate)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.first_guess import seen_pose
 from rig_identification.estimate.track import Track
 from rig_identification.model.sensors import MocapMount
 
@@ -30,20 +31,19 @@ def without_mocap(run: Run) -> Run:
 
 
 def mount_from_track(run: Run, track: Track) -> MocapMount | None:
-    """Mounts under which the tracker sees the motion that ``track`` tells; None without motion capture."""
-    channels = {c.quantity: c for c in run.channels if c.device == "mocap"}
-    if "position" not in channels or "orientation" not in channels or run.R_tracker_mean is None:
+    """Mounts with which a tracker sees what ``track`` tells; None where it sees less than a pose."""
+    pose = seen_pose(run)
+    if pose is None or run.R_tracker_mean is None or not np.all(pose.known):
         return None
-    place, turn = channels["position"], channels["orientation"]
-    inside = (turn.time > track.time[0]) & (turn.time < track.time[-1])
-    time = turn.time[inside]
+    inside = (pose.time > track.time[0]) & (pose.time < track.time[-1])
+    time = pose.time[inside]
     node = np.clip(np.rint(time / (track.time[1] - track.time[0])).astype(int), 0, track.time.size - 1)
     R, x = track.R_world_body[node], track.states[node, :3]
-    seen = np.stack([np.interp(time, place.time, place.values[:, i]) for i in range(3)], axis=1)
+    seen, turn = pose.position[inside], pose.turn[inside]
     mean = Rotation.from_matrix(R).mean().as_matrix()
     turned = Rotation.from_matrix(mean.T @ R).as_rotvec()
-    turned_marker = turn.values[inside] - np.mean(turn.values[inside], axis=0)
-    R_mean = run.R_tracker_mean @ Rotation.from_rotvec(np.mean(turn.values[inside], axis=0)).as_matrix()
+    turned_marker = turn - np.mean(turn, axis=0)
+    R_mean = run.R_tracker_mean @ Rotation.from_rotvec(np.mean(turn, axis=0)).as_matrix()
     way_marker = (seen - np.mean(seen, axis=0)) @ R_mean
     marker, R_body_marker = np.zeros(3), np.eye(3)
     for _ in range(ROUNDS):

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from rig_identification.estimate.evidence import Run, prepare
+from rig_identification.estimate.first_guess import seen_pose
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.start_state import fit_start
@@ -25,15 +26,15 @@ BEHIND, NOISE = 6.0, 1.2
 
 def _pull(run: Run, gravity: float, length: float) -> tuple[Array, Array] | None:
     """(time (n,), acceleration (n, 2) m/s^2) that gravity on cables of ``length`` does not account for."""
-    place = next((c for c in run.channels if c.device == "mocap" and c.quantity == "position"), None)
-    if place is None:
+    place = seen_pose(run)
+    if place is None or not np.all(place.known[:2]):
         return None
     step = float(np.median(np.diff(place.time)))
     window = max(5, 2 * int(0.5 * WINDOW / step) + 1)
     if place.time.size < window:
         return None
     even = np.arange(place.time[0], place.time[-1], step)
-    path = np.stack([np.interp(even, place.time, v) for v in place.values.T[:2]], axis=1)
+    path = np.stack([np.interp(even, place.time, v) for v in place.position.T[:2]], axis=1)
     acceleration = savgol_filter(path, window, 3, deriv=2, delta=step, axis=0)
     calm = savgol_filter(path, window, 3, axis=0)
     return even, acceleration + gravity / length * (calm - np.mean(calm, axis=0))

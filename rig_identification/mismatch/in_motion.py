@@ -37,7 +37,7 @@ def _cost(
     total, white = 0.0, 0.0
     for run, rows, residual in zip(runs, linearised, residuals, strict=True):
         for index, channel in enumerate(run.channels):
-            for axis in range(channel.width):
+            for axis in channel.axes:
                 own = residual[(rows.channel == index) & (rows.axis == axis)]
                 step = run.grid.duration / max(own.size, 1)
                 calm = own[min(int(settling / step), own.size // 2) :]

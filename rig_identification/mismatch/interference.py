@@ -106,13 +106,17 @@ def _columns(recording: Recording) -> Iterator[_Column]:
         yield _Column(cable, None, "tension", "N", series.time, series.values[:, 0])
     if recording.imu is not None:
         for i, axis in enumerate(AXES):
-            time, values = recording.imu.time, recording.imu.values
-            yield _Column("imu", axis, "angular_rate", "rad/s", time, values[:, i])
-            yield _Column("imu", axis, "specific_force", "m/s^2", time, values[:, 3 + i])
+            yield _column("imu", axis, "angular_rate", "rad/s", recording.imu, i)
+            yield _column("imu", axis, "specific_force", "m/s^2", recording.imu, 3 + i)
     if recording.inclination is not None:
         for i, axis in enumerate(AXES[:2]):
-            series = recording.inclination
-            yield _Column("inclinometer", axis, "inclination", "rad", series.time, series.values[:, i])
+            yield _column("inclinometer", axis, "inclination", "rad", recording.inclination, i)
+
+
+def _column(device: str, axis: str, kind: str, unit: str, series: Series, index: int) -> _Column:
+    """What a device measured along one axis."""
+    known = np.isfinite(series.values[:, index])
+    return _Column(device, axis, kind, unit, series.time[known], series.values[known, index])
 
 
 def _resolution(column: _Column) -> float:
@@ -218,7 +222,7 @@ def _less(recording: Recording, column: _Column, signal: Array) -> Recording:
 
     def taken(series: Series, index: int) -> Series:
         values = series.values.copy()
-        values[:, index] -= signal
+        values[np.isfinite(values[:, index]), index] -= signal
         return replace(series, values=values)
 
     if column.device in recording.tension:

@@ -18,7 +18,7 @@ from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import Ideal, Scores, judged
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
-from rig_identification.estimate.segments import PIECE, in_pieces
+from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.explained import evidence_of
@@ -31,8 +31,8 @@ from rig_identification.mismatch.threads import physics_of_pendulums
 from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
 from rig_identification.result import ELEMENTS, Mismatch
 
-#: Length of the pieces, s: friction shows against the amplitude, which must change within one.
-LONG_PIECE = 2.0 * PIECE
+#: How many times as long pieces are: friction shows against the amplitude, which must change within one.
+LONGER = 2.0
 #: Steps of the fit of whole runs.
 WHOLE_STEPS = 20
 
@@ -63,9 +63,9 @@ def _tempered(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evalua
 
 def _begun_whole(ideal: Fitted, weights: Problem, evaluation: Evaluation) -> tuple[Problem, Point]:
     """Whole runs with the effects of ``weights``, weighed as there, and where their fit starts."""
-    noise = {(c.device, c.quantity): c.noise for run in weights.runs for c in run.channels}
+    noise = {c.key: c.noise for run in weights.runs for c in run.channels}
     runs = tuple(
-        replace(run, channels=tuple(replace(c, noise=noise[c.device, c.quantity]) for c in run.channels))
+        replace(run, channels=tuple(replace(c, noise=noise.get(c.key, c.noise)) for c in run.channels))
         for run in ideal.problem.runs
     )
     heavy = replace(ideal.problem, runs=runs, bench=weights.bench, weak_center=weights.weak_center)
@@ -104,7 +104,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     start = found_ideal.careful[1].point.theta
     guesses = ideal.evaluation.point.rest_guesses
     known = with_reference(ideal.problem, ideal.rest)
-    parts, point = in_pieces(known, start, ideal.rest, guesses, LONG_PIECE)
+    parts, point = in_pieces(known, start, ideal.rest, guesses, LONGER)
     evaluation, _ = solve(parts, point, iterations=STEPS, tolerance=0.5)
     raw, parts = parts, reweighted(parts, evaluation)
     again = evaluate(parts, evaluation.point)

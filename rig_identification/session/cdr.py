@@ -89,11 +89,27 @@ def _wrench(columns: Columns) -> Floats:
     return columns.doubles(6)
 
 
+#: First element of a covariance whose quantity the device does not measure (sensor_msgs/msg/Imu).
+_NOT_MEASURED = -1.0
+
+
 def _imu(columns: Columns) -> Floats:
     columns.skip_doubles(4 + 9)
-    rate = columns.doubles(3)
-    columns.skip_doubles(9)
-    return np.hstack((rate, columns.doubles(3)))
+    rate, rate_covariance = columns.doubles(3), columns.doubles(9)
+    force, force_covariance = columns.doubles(3), columns.doubles(9)
+    rate[rate_covariance[:, 0] == _NOT_MEASURED] = np.nan
+    force[force_covariance[:, 0] == _NOT_MEASURED] = np.nan
+    return np.hstack((rate, force))
+
+
+def _imu_message(message: Any) -> tuple[float, ...]:
+    missing = (float("nan"),) * 3
+    rate, force = _xyz(message.angular_velocity), _xyz(message.linear_acceleration)
+    if message.angular_velocity_covariance[0] == _NOT_MEASURED:
+        rate = missing
+    if message.linear_acceleration_covariance[0] == _NOT_MEASURED:
+        force = missing
+    return rate + force
 
 
 def _odometry(columns: Columns) -> Floats:
@@ -110,7 +126,7 @@ def _joint_state(columns: Columns) -> Floats:
     return np.hstack((angle, _first_double(columns)))
 
 
-def _xyz(vector: Any) -> tuple[float, float, float]:
+def _xyz(vector: Any) -> tuple[float, ...]:
     return vector.x, vector.y, vector.z
 
 
@@ -128,7 +144,9 @@ _TYPES: dict[str, tuple[int, Callable[[Columns], Floats], Callable[[Any], tuple[
     "geometry_msgs/msg/WrenchStamped": (6, _wrench, lambda m: _xyz(m.wrench.force) + _xyz(m.wrench.torque)),
     "geometry_msgs/msg/Vector3Stamped": (3, lambda columns: columns.doubles(3), lambda m: _xyz(m.vector)),
     "geometry_msgs/msg/PoseStamped": (7, lambda columns: columns.doubles(7), lambda m: _pose(m.pose)),
-    "sensor_msgs/msg/Imu": (6, _imu, lambda m: _xyz(m.angular_velocity) + _xyz(m.linear_acceleration)),
+    "geometry_msgs/msg/PointStamped": (3, lambda columns: columns.doubles(3), lambda m: _xyz(m.point)),
+    "sensor_msgs/msg/Imu": (6, _imu, _imu_message),
+    "std_msgs/msg/Float64": (1, lambda columns: columns.doubles(1), lambda m: (float(m.data),)),
     "nav_msgs/msg/Odometry": (
         13,
         _odometry,
@@ -137,6 +155,9 @@ _TYPES: dict[str, tuple[int, Callable[[Columns], Floats], Callable[[Any], tuple[
     "sensor_msgs/msg/JointState": (2, _joint_state, lambda m: (_first(m.position), _first(m.velocity))),
 }
 
+#: Types without a stamp of their own: the recorder's is the only one.
+_WITHOUT_HEADER = frozenset({"std_msgs/msg/Float64"})
+
 
 def decode(topic: RawTopic) -> tuple[NDArray[np.int64], Floats]:
     """Stamps and numbers of every message of a topic.
@@ -144,10 +165,11 @@ def decode(topic: RawTopic) -> tuple[NDArray[np.int64], Floats]:
     Returns
     -------
     stamp_ns : (n,) int64
-        ``header.stamp`` in ns, in the order of the file.
+        ``header.stamp`` in ns, in the order of the file; when the recorder got it where a type has no header.
     values : (n, width) float64
         Wrench: force, torque. Vector3: x y z. Pose: position, quaternion xyzw. Imu: angular velocity, linear
         acceleration. Odometry: pose, twist (linear, angular). JointState: first position, first velocity.
+        What an IMU marks as not measured is NaN.
 
     Raises
     ------
@@ -155,12 +177,14 @@ def decode(topic: RawTopic) -> tuple[NDArray[np.int64], Floats]:
         A message that does not deserialize.
     """
     width, by_columns, _ = _TYPES[topic.message_type]
+    headless = topic.message_type in _WITHOUT_HEADER
     stamps = np.empty(topic.count, np.int64)
     values = np.empty((topic.count, width))
     for block in topic.blocks:
         try:
             columns = Columns(block.data)
-            stamps[block.index], values[block.index] = columns.header(), by_columns(columns)
+            own = topic.received_ns[block.index] if headless else columns.header()
+            stamps[block.index], values[block.index] = own, by_columns(columns)
         except VaryingLayout:
             stamps[block.index], values[block.index] = _decode_each(topic, block)
     return stamps, values
@@ -178,6 +202,9 @@ def _decode_each(topic: RawTopic, block: MessageBlock) -> tuple[list[int], list[
                 f"{topic.name}: message {index} ({len(data)} bytes) is no {topic.message_type}; "
                 "record the topic anew"
             ) from err
-        stamps.append(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
+        if topic.message_type in _WITHOUT_HEADER:
+            stamps.append(int(topic.received_ns[index]))
+        else:
+            stamps.append(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
         values.append(fields(message))
     return stamps, values

@@ -109,9 +109,16 @@ def up_in_body(inclination: Array, mounted: Rotation) -> Array:
 def _mean(series: Series | None, width: int, noise: float, blocks: int = 10) -> tuple[Array, Array]:
     if series is None or len(series.time) == 0:
         return np.full(width, np.nan), np.full(width, np.nan)
-    mean = series.values.mean(axis=0)
-    floor = noise / np.sqrt(len(series.time))
-    if len(series.time) < 2 * blocks:
-        return mean, np.full(width, max(noise, floor))
-    parts = np.array([part.mean(axis=0) for part in np.array_split(series.values, blocks)])
-    return mean, np.maximum(parts.std(axis=0, ddof=1) / np.sqrt(blocks), floor)
+    mean, std = np.full((2, width), np.nan)
+    for part in series.parts():
+        # What is measured together most often comes first, and stands
+        missing = [c for c in part.components if np.isnan(mean[c])]
+        values = part.series.values[:, [part.components.index(c) for c in missing]]
+        mean[missing] = values.mean(axis=0)
+        floor = noise / np.sqrt(len(values))
+        if len(values) < 2 * blocks:
+            std[missing] = max(noise, floor)
+        else:
+            means = np.array([block.mean(axis=0) for block in np.array_split(values, blocks)])
+            std[missing] = np.maximum(means.std(axis=0, ddof=1) / np.sqrt(blocks), floor)
+    return mean, std

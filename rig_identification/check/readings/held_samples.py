@@ -3,11 +3,14 @@
 After a change of several converter steps the next sample is exactly the same, in all components, far more
 often than noise and rounding bring it to within one step. A resting signal on a coarse converter repeats
 too, but never after a change of several steps.
+
+What is read off the pictures of a compressed film repeats to within a hair: the picture is the same, and
+coded anew. Where nothing repeats exactly, that is looked for as well.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import bdtrc
@@ -23,6 +26,7 @@ from rig_identification.check.readings.channel_model import (
     repeats,
     resolution,
 )
+from rig_identification.check.readings.held_stamps import steady
 from rig_identification.check.readings.telling import (
     Spotted,
     devices_of,
@@ -49,6 +53,11 @@ _HELD = 0.9
 _RUNS = 32
 #: Fewer repeats than one in ten do no harm: a sample late by one interval now and then.
 _SELDOM = 0.1
+#: A hair, as a share of the step that a signal takes in one sample of four or more.
+_HAIR = 0.02
+#: How often at most a step that follows a large one is no more than a hair without a fault: noise whose
+#: density of steps is _PEAK times the mean one at 0, of which a hair either way is so much; rounded up.
+_HAIR_BY_CHANCE = 0.1
 #: Two cells on one logger are read at one rate.
 _SAME_RATE = 0.02
 
@@ -71,18 +80,29 @@ class _Changes:
 
 def find(session: RawSession) -> tuple[Found, ...]:
     """Channels whose samples are repeated; each keeps the first sample of every hold."""
-    spotted = [one for (_, _), recorded in channels_of(session) for one in _spotted(session, recorded)]
+    spotted = []
+    for _, recorded in channels_of(session):
+        spotted += _spotted(session, recorded, exactly=True) or _spotted(session, recorded, exactly=False)
     return told(session, together(spotted, tolerance=_SAME_RATE), _fault)
 
 
-def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:
-    """Each recording of one channel, where at least one of them shows that it is held."""
+def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]], *, exactly: bool) -> list[Spotted]:
+    """Each recording of one channel, where at least one of them shows that it is held.
+
+    exactly: samples that differ by a hair are not held.
+    """
+    least = 0.0 if exactly else _HAIR_BY_CHANCE
+
+    def rows(channel: RawChannel, columns: tuple[int, ...]) -> Array:
+        return channel.values if exactly else _combed(channel.values, columns)
+
     holds: list[tuple[str, _Hold]] = []
     contradicted: set[int] = set()
     for number, channel in recorded:
         for quantity, columns in groups(channel).items():
-            changes = _changes(channel.values, columns)
-            hold = _hold(channel.values, columns, changes)
+            values = rows(channel, columns)
+            changes = _changes(values, columns, least)
+            hold = _hold(values, columns, changes)
             if hold is not None:
                 holds.append((quantity, hold))
             elif changes.events * _HELD > _DISTINCT and changes.repeated < 0.5 * changes.events:
@@ -94,21 +114,44 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]]) -> lis
     out = []
     for number, channel in recorded:
         shown = groups(channel).get(quantity)
-        if shown is None or (number in contradicted and not _held_here(channel, shown)):
+        if shown is None:
             continue
-        kept = _first_of_each(repeats(channel.values, shown), hold.samples)
+        values = rows(channel, shown)
+        if number in contradicted and _hold(values, shown, _changes(values, shown, least)) is None:
+            continue
+        same = repeats(values, shown)
+        kept = _first_of_each(same, hold.samples)
+        left = only(channel, kept) if exactly else _of_film(channel, kept, ~same)
         rate = 1.0 / (hold.samples * interval(channel)) if interval(channel) else 0.0
         out.append(
             Spotted(
-                channel.device, channel.channel, number, only(channel, kept),
-                count=int(np.count_nonzero(~kept)), gain=hold.gain / len(recorded), value=rate,
+                channel.device, channel.channel, number, left,
+                count=len(channel.stamp_ns) - len(left.stamp_ns), gain=hold.gain / len(recorded), value=rate,
             )
         )  # fmt: skip
     return out
 
 
-def _held_here(channel: RawChannel, columns: tuple[int, ...]) -> bool:
-    return _hold(channel.values, columns, _changes(channel.values, columns)) is not None
+def _of_film(channel: RawChannel, kept: Flags, fresh: Flags) -> RawChannel:
+    """The channel with the pictures that are new, stamped when they were taken.
+
+    A film's stamps count its pictures, new or shown on. kept (n,): one for each time that the camera took a
+    picture. fresh (n,): those that are new: within a hair of what it was no moving signal comes to rest, and
+    a long hold is one picture where another was lost.
+    """
+    first = only(channel, kept)
+    return only(replace(first, stamp_ns=steady(first.stamp_ns, interval(channel))), fresh[kept])
+
+
+def _combed(values: Array, columns: tuple[int, ...]) -> Array:
+    """The values with each sample that is within a hair of the one before it equal to that one."""
+    chosen = np.array(columns, dtype=np.int64)
+    steps = np.abs(np.diff(values[:, chosen], axis=0))
+    near = np.all(steps <= _HAIR * np.nanpercentile(steps, 75.0, axis=0), axis=1)
+    first = np.append(0, np.where(near, 0, np.arange(1, len(values))))
+    combed = np.array(values)
+    combed[:, chosen] = values[np.maximum.accumulate(first)][:, chosen]
+    return combed
 
 
 def _slowest(holds: list[tuple[str, _Hold]]) -> tuple[str, _Hold] | None:
@@ -120,7 +163,8 @@ def _slowest(holds: list[tuple[str, _Hold]]) -> tuple[str, _Hold] | None:
     return quantity, _Hold(float(np.median([hold.samples for hold in same])), sum(hold.gain for hold in same))
 
 
-def _changes(values: Array, columns: tuple[int, ...]) -> _Changes:
+def _changes(values: Array, columns: tuple[int, ...], least: float) -> _Changes:
+    """What follows large changes. least: chance of a repeat, at least."""
     same = repeats(values, columns)
     large, chance = np.zeros(len(values), bool), 1.0
     steps = {k: resolution(values[:, k]) for k in columns}
@@ -138,7 +182,7 @@ def _changes(values: Array, columns: tuple[int, ...]) -> _Changes:
         chance = min(chance, _PEAK * (near + 1) / (2 * _STEPS * max(len(event), 1)))
     distinct = len(np.unique(values[event, columns[0]])) if len(event) else 0
     distinct = max([distinct] + [len(np.unique(values[event, k])) for k in columns[1:]])
-    return _Changes(len(event), int(np.count_nonzero(same[event + 1])), chance, distinct)
+    return _Changes(len(event), int(np.count_nonzero(same[event + 1])), max(chance, least), distinct)
 
 
 def _hold(values: Array, columns: tuple[int, ...], changes: _Changes) -> _Hold | None:
@@ -178,7 +222,8 @@ def _first_of_each(same: Flags, samples: float) -> Flags:
     kept = ~same
     starts = np.flatnonzero(kept)
     lengths = np.diff(np.append(starts, len(same)))
-    holds = np.round(lengths / np.ceil(samples - 0.1)).astype(np.int64)
+    # What is half a hold too long is still one
+    holds = np.ceil(lengths / np.ceil(samples - 0.1) - 0.5).astype(np.int64)
     for k in np.flatnonzero(holds > 1):
         kept[starts[k] + (np.arange(holds[k]) * lengths[k]) // holds[k]] = True
     return kept

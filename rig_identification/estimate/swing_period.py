@@ -1,0 +1,56 @@
+"""How long a swing takes, how long a piece of a run has to be to tell of it, and what lies beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.sampling import LOCAL
+
+Array = NDArray[np.float64]
+
+#: Swings over which one is followed by its own line, its size and its middle changing steadily: six numbers.
+FOLLOWED = 2.0
+#: Swings that a piece holds at least where nothing but the motion is measured: inertia then shows in the
+#: period alone, and a period in no less than a turn and its half.
+SWINGS = 1.5
+#: Quantities that tell of inertia within a moment: force, and acceleration.
+FORCES = frozenset({"tension", "specific_force"})
+
+
+def swing_period(run: Run) -> float:
+    """Period (s) of the strongest line, each axis in units of its noise."""
+    best, period = 0.0, LOCAL
+    for c in run.channels:
+        step = (c.time[-1] - c.time[0]) / max(c.time.size - 1, 1)
+        centred = (c.values - np.mean(c.values, axis=0)) / c.noise
+        power = np.abs(np.fft.rfft(centred * np.hanning(c.time.size)[:, None], axis=0))
+        line = int(np.argmax(np.max(power[1:], axis=1))) + 1
+        if np.max(power[line]) > best:
+            best, period = float(np.max(power[line])), step * c.time.size / line
+    return max(period, LOCAL)
+
+
+def long_enough(run: Run, seconds: float) -> float:
+    """``seconds``, or what some swings take where a run measures neither force nor acceleration."""
+    if any(c.quantity in FORCES for c in run.channels):
+        return seconds
+    return max(seconds, min(SWINGS * swing_period(run), run.grid.duration))
+
+
+def beside_a_swing(time: Array, values: Array, period: float) -> Array:
+    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell."""
+    block = np.floor((time - time[0]) / (FOLLOWED * period)).astype(np.int64)
+    total, freedom = np.zeros(values.shape[1]), 0
+    for number in np.unique(block):
+        t = time[block == number] / period
+        if t.size < 12:
+            continue
+        t = t - np.mean(t)
+        angle = 2.0 * np.pi * t
+        line = np.stack([np.ones_like(t), np.cos(angle), np.sin(angle)], axis=1)
+        basis = np.linalg.qr(np.concatenate([line, t[:, None] * line], axis=1))[0]
+        rest = values[block == number] - basis @ (basis.T @ values[block == number])
+        total, freedom = total + np.sum(rest**2, axis=0), freedom + t.size - basis.shape[1]
+    return np.asarray(np.sqrt(total / max(freedom, 1)))
