@@ -175,8 +175,8 @@ def _with(rung: Rung, candidate: Candidate, values: dict[str, float]) -> tuple[P
 def _closer(problem: Problem, standing: Standing, say: Callable[[str], None]) -> Iterator[Standing]:
     """The model with closer descriptions of its effects that first order cannot tell from them.
 
-    Each takes the place of its effect; with a second effect in the model a closer description of the first one
-    may be the likelier one. problem: without any effect.
+    Each takes the place of its effect. With a second effect in the model a closer description of the first
+    one may be the likelier one. problem: without any effect.
     """
     rung = standing.rung
     for k, candidate in enumerate(standing.found):
