@@ -80,7 +80,7 @@ def search(
         def say(label: str, step: int = step) -> None:
             notify(f"search: {label}", (step + 0.5) / (MOST_EFFECTS + 1))
 
-        children = _children(standing, candidates, budget, say)
+        children = _children(problem, standing, candidates, budget, say)
         if not children:
             break
         best = children[0]
@@ -99,9 +99,13 @@ def search(
 
 
 def _children(
-    standing: Standing, candidates: list[Candidate], budget: Budget, say: Callable[[str], None]
+    problem: Problem,
+    standing: Standing,
+    candidates: list[Candidate],
+    budget: Budget,
+    say: Callable[[str], None],
 ) -> list[Standing]:
-    """Models with one more effect, each at its own level, likeliest first.
+    """Models with one more effect, each at its own level, likeliest first. problem: without any effect.
 
     Once the ``budget`` is spent no further hypothesis is fitted.
     """
@@ -136,7 +140,7 @@ def _children(
         down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
         if down is not None:
             walked.append(replace(child, rung=down))
-            walked += _closer(rung, walked[-1], say)
+            walked += _closer(problem, walked[-1], say)
     return sorted(walked, key=lambda s: -s.rung.evidence)
 
 
@@ -168,31 +172,41 @@ def _with(rung: Rung, candidate: Candidate, values: dict[str, float]) -> tuple[P
     return wide, beside(rung.problem, point, wide, rung.evaluation)
 
 
-def _closer(parent: Rung, standing: Standing, say: Callable[[str], None]) -> Iterator[Standing]:
-    """The model with closer descriptions of its last effect that first order cannot tell from it.
+def _closer(problem: Problem, standing: Standing, say: Callable[[str], None]) -> Iterator[Standing]:
+    """The model with closer descriptions of its effects that first order cannot tell from them.
 
-    They take the place of that effect in the model without it, ``parent``'s.
+    Each takes the place of its effect. With a second effect in the model a closer description of the first
+    one may be the likelier one. problem: without any effect.
     """
-    candidate, rung = standing.found[-1], standing.rung
-    asked = candidate.between or candidate.closer
-    if asked is None:
-        return
-    for closer, values in asked(rung.problem, rung.evaluation):
-        say(closer.label)
-        wide = extended(parent.problem, (closer,))
-        point = carried(wide, rung.problem, _without_last(parent, rung.evaluation.point))
-        down = walked_down(wide, promised(wide, point, closer, values, rung.evaluation), rung.level)
-        if down is not None:
-            yield Standing(down, (*standing.found[:-1], closer))
+    rung = standing.rung
+    for k, candidate in enumerate(standing.found):
+        asked = candidate.between or candidate.closer
+        if asked is None:
+            continue
+        others = (*standing.found[:k], *standing.found[k + 1 :])
+        parent = replace(extended(problem, others), discrepancy=rung.problem.discrepancy)
+        for closer, values in asked(rung.problem, rung.evaluation):
+            say(closer.label)
+            wide = extended(parent, (closer,))
+            point = carried(wide, rung.problem, _without(problem, standing, k))
+            point = promised(wide, point, closer, values, rung.evaluation)
+            down = walked_down(wide, beside(rung.problem, point, wide, rung.evaluation), rung.level)
+            if down is not None:
+                yield Standing(down, (*others, closer))
 
 
-def _without_last(parent: Rung, point: Point) -> Point:
-    """The point without what the last effect moves within the rig."""
-    kept = parent.problem.bench.parameters.model.internal
+def _without(problem: Problem, standing: Standing, left_out: int) -> Point:
+    """The point without what one of the effects moves within the rig. problem: without any effect."""
+    model = problem.bench.parameters.model
+    kept = [True] * model.internal
+    for k, candidate in enumerate(standing.found):
+        wider, _ = candidate.built(model)
+        kept += [k != left_out] * (wider.internal - model.internal)
+        model = wider
+    point, stay = standing.rung.evaluation.point, np.array(kept + kept, dtype=bool)
 
     def own(state: State) -> State:
-        count = state.internal.size // 2
-        return replace(state, internal=np.concatenate([state.internal[:kept], state.internal[count:][:kept]]))
+        return replace(state, internal=state.internal[stay]) if state.internal.size == stay.size else state
 
     return replace(
         point, starts=tuple(map(own, point.starts)), rest_guesses=tuple(map(own, point.rest_guesses))
