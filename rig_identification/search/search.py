@@ -60,10 +60,9 @@ def search(
 ) -> tuple[Explained | None, Rung | None]:
     """What explains the session, but for a trace perhaps, None where nothing does; and the last model.
 
-    budget: how much it may compute. heard: is told what explains the session, as it is found.
+    budget: how much it may compute. Once it is spent the last model is the first one: it tells how wide the
+    intervals of the body have to be. heard: is told what explains the session, as it is found.
     """
-    if budget.spent():
-        return None, None
     fitted = ideal.fitted
     problem = with_reference(replace(fitted.problem, discrepancy=None), fitted.rest)
     notify("search: the motion as recorded", 0.05)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rig_identification.estimate.identify import CAUTION, TIED, Ideal, compose, scores
 from rig_identification.estimate.verdict import hear
 from rig_identification.estimate.without_frame import subtract_frame
@@ -60,7 +62,11 @@ class SoFar:
         rung, frame = self.rung, self.session.rig.frame
         if answer.mismatch.verdict != "unexplained" or rung is None or rung.alone:
             return answer
-        total = with_what_follows(rung.problem, rung.evaluation)
+        try:
+            total = with_what_follows(rung.problem, rung.evaluation)
+        except np.linalg.LinAlgError:
+            # Recordings that tell next to nothing: the cautious fit's numbers stand
+            return answer
         return replace(
             answer,
             total=total,
