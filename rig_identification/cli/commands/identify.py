@@ -40,7 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Read, identify, write, and print the ten numbers."""
     identify_session(
-        arguments.session, arguments.out, arguments.namespace, dict(arguments.topic), arguments.work
+        arguments.session, arguments.out, arguments.namespace, dict(arguments.topic), work=arguments.work
     )
 
 
@@ -60,6 +60,7 @@ def identify_session(
     out: Path,
     namespace: str = "/rig",
     topics: dict[str, str] | None = None,
+    *,
     remark: Callable[[Identification], str] | None = None,
     work: float = WORK,
 ) -> None:
