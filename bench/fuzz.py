@@ -32,7 +32,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from bench.fuzz_sessions import Recipe, recipe_of, session_of, simpler
 from rig_identification.errors import InputError
-from rig_identification.mismatch.budget import WORK
+from rig_identification.model.work import WORK
 
 #: What stands in a page beside its texts.
 UNREAD = re.compile(r"<(style|script|svg).*?</\1>", flags=re.DOTALL)

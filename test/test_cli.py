@@ -22,7 +22,7 @@ from rig_identification.cli.summary import summary
 from rig_identification.errors import InputError
 from rig_identification.examination import Examination
 from rig_identification.identification import Prepared
-from rig_identification.mismatch.budget import WORK
+from rig_identification.model.work import WORK
 from rig_identification.raw import RawSession
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted, Work

@@ -23,7 +23,7 @@ LAG = 0.012
 
 def _fit(residual):  # type: ignore[no-untyped-def]
     """The least that a trial's problem and evaluation hold for one channel of one run."""
-    channel = SimpleNamespace(width=1)
+    channel = SimpleNamespace(axes=(0,))
     run = SimpleNamespace(channels=(channel,), grid=SimpleNamespace(duration=DURATION))
     rows = np.zeros(SAMPLES, dtype=int)
     linearised = SimpleNamespace(residual=residual, channel=rows, axis=rows, log_spread=0.0)

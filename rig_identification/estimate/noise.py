@@ -65,6 +65,8 @@ def _left_by_differences(time: Array, values: Array) -> Array:
     """
     steps = np.diff(time)
     even = np.abs(steps - np.median(steps)) < UNEVEN * np.median(steps)
+    if even.size < FEWEST * ORDER:
+        return np.full(values.shape[1], np.inf)
     usable = np.lib.stride_tricks.sliding_window_view(even, ORDER).all(axis=1)
     if np.count_nonzero(usable) < FEWEST * ORDER:
         return np.full(values.shape[1], np.inf)

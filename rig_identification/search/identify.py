@@ -26,7 +26,7 @@ from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.without_frame import subtract_frame
-from rig_identification.mismatch.budget import WORK, Budget
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
@@ -34,7 +34,7 @@ from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.stretched_at_first import with_stretch_told
 from rig_identification.mismatch.watched import Watched, explain_watched
-from rig_identification.model.work import counted
+from rig_identification.model.work import WORK, counted
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted
 from rig_identification.search.search import search

@@ -33,6 +33,9 @@ Notify = Callable[[str, float], None]
 
 #: Effects that are told of a session at most.
 MOST_EFFECTS = 3
+#: Effects in a row that leave the wrench as strong as it was: of two that are there the first one may, and
+#: what two leave they do not explain.
+IDLE = 2
 #: Hypotheses that are fitted after each screening, of each kind so many, and how many to their own level.
 FITTED, ALIKE, WALKED = 5, 2, 3
 #: Share of the best promise that another one has to come to.
@@ -71,9 +74,9 @@ def search(
     if first is None:
         return None, None
     candidates = catalogue(problem)
-    standing, best_told = Standing(first), None
+    standing, best_told, idle = Standing(first), None, 0
     for step in range(MOST_EFFECTS):
-        if budget.spent():
+        if budget.spent() or idle == IDLE:
             break
 
         def say(label: str, step: int = step) -> None:
@@ -85,6 +88,7 @@ def search(
         best = children[0]
         if best.rung.evidence < standing.rung.evidence + NEEDED + np.log(count_of(candidates)):
             break
+        idle = 0 if best.rung.level > standing.rung.level or best.rung.alone else idle + 1
         standing = best
         if standing.rung.level < NEARLY_ALONE:
             continue

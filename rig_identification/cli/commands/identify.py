@@ -16,7 +16,7 @@ from pathlib import Path
 from rig_identification.cli.output import check_output_folder, write_together
 from rig_identification.cli.progress import StageProgress
 from rig_identification.cli.session_options import add_session_options, read_recorded, watched
-from rig_identification.mismatch.budget import WORK
+from rig_identification.model.work import WORK
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted
 
