@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from rig_identification.model import work
 from rig_identification.model.work import WORK, Meter
 
-#: Share of an answer's work that whole runs with what was found, and a stand-in for what was not, may take beyond: half
-#: a minute. What has not settled by then is not told.
+#: Share of an answer's work that whole runs with what was found, and a stand-in for what was not, may take
+#: beyond: half a minute. What has not settled by then is not told.
 BEYOND = 0.25
 
 
