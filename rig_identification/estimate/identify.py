@@ -64,7 +64,7 @@ from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
 from rig_identification.estimate.whole import fit_whole, predicted
-from rig_identification.estimate.without_frame import subtract_frame
+from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.model.sensors import MocapMount
 from rig_identification.recording import Recording, Session
@@ -577,7 +577,7 @@ def compose(
     frame = session.rig.frame
     return Identification(
         total=total,
-        without_frame=None if frame is None else subtract_frame(total, frame),
+        without_frame=vehicle_alone(total, frame),
         mismatch=mismatch,
         parameters=parameter_estimates(fitted.problem, fitted.evaluation),
         channels=found.channels,

@@ -6,7 +6,7 @@ import numpy as np
 
 from rig_identification.estimate.observability import believed_std
 from rig_identification.estimate.solve import CannotBeFollowed
-from rig_identification.estimate.without_frame import subtract_frame
+from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, Identification, InertialEstimate, Mismatch
 
@@ -30,7 +30,7 @@ def unanswered(session: Session, why: CannotBeFollowed) -> Identification:
     frame = session.rig.frame
     return Identification(
         total=total,
-        without_frame=None if frame is None else subtract_frame(total, frame),
+        without_frame=vehicle_alone(total, frame),
         mismatch=Mismatch("unexplained", NOT_FOLLOWED.format(names=", ".join(why.names))),
         parameters=(),
         channels=(),

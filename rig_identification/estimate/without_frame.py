@@ -55,3 +55,8 @@ def subtract_frame(total: InertialEstimate, frame: CarryingFrame) -> InertialEst
             }
             lost |= set(touched[axis])
     return InertialEstimate(rest(both), map_ @ covariance @ map_.T, tuple(n for n in ELEMENTS if n in lost))
+
+
+def vehicle_alone(total: InertialEstimate, frame: CarryingFrame | None) -> InertialEstimate | None:
+    """The body without its carrying frame; None where the rig has none."""
+    return None if frame is None else subtract_frame(total, frame)

@@ -27,6 +27,8 @@ from rig_identification.result import Finding
 STEPS = 6
 #: Chance with which an amount that is none gains as much as one that is told at least.
 CHANCE = 0.05
+#: What is told of a finding that was not weighed by itself.
+NOT_WEIGHED: Mapping[str, float | None] = {"log_likelihood_gain": None, "holdout_error_before": None}
 
 
 def each_by_itself(found: Explained, stop: Callable[[], bool]) -> Explained:
@@ -55,9 +57,7 @@ def not_weighed(found: Explained) -> Explained:
     if len(found.effects) < 2:
         return found
     findings = tuple(
-        replace(f, evidence=dict(f.evidence) | {"log_likelihood_gain": None, "holdout_error_before": None})
-        if any(_tells(f, t) for t in found.effects)
-        else f
+        replace(f, evidence={**f.evidence, **NOT_WEIGHED}) if any(_tells(f, t) for t in found.effects) else f
         for f in found.mismatch.findings
     )
     return replace(found, mismatch=replace(found.mismatch, findings=findings))
@@ -75,14 +75,13 @@ def _own_evidence(
 ) -> dict[str, float | None]:
     """``evidence`` of the effect ``k`` by itself. told: that of all of them."""
     whole = found.fitted
-    nothing: dict[str, float | None] = {"log_likelihood_gain": None, "holdout_error_before": None}
     if stop():
-        return {**told, **nothing}
+        return {**told, **NOT_WEIGHED}
     try:
         less = _without(found, k, stop)
     except (FloatingPointError, np.linalg.LinAlgError):
         # What is left cannot be followed without it
-        return {**told, **nothing}
+        return {**told, **NOT_WEIGHED}
     ideal, before = found.ideal, scores(less).holdout
     cost = less.evaluation.cost
     if _same_runs(ideal.fitted, whole) and ideal.fitted.evaluation.cost < cost:

@@ -25,7 +25,7 @@ from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
-from rig_identification.estimate.without_frame import subtract_frame
+from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explain import explain
 from rig_identification.mismatch.explained import Explained
@@ -131,10 +131,8 @@ def _answer_of(watched: Watched, session: Session, plain: Identification) -> Ide
     answer = compose(session, watched.fitted, scores(watched.fitted), watched.mismatch, watched.careful)
     lost = {*answer.total.unobservable, *watched.unobservable}
     total = replace(answer.total, unobservable=with_products(lost))
-    answer = replace(answer, total=total, figures={**answer.figures, "ideal": plain})
-    if session.rig.frame is not None:
-        answer = replace(answer, without_frame=subtract_frame(total, session.rig.frame))
-    return answer
+    alone = vehicle_alone(total, session.rig.frame)
+    return replace(answer, total=total, without_frame=alone, figures={**answer.figures, "ideal": plain})
 
 
 def _worth_a_search(watched: Watched) -> bool:

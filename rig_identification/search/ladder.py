@@ -132,12 +132,10 @@ def _followed(problem: Problem, point: Point) -> Evaluation | None:
     An effect that enters with all of its amount acts beside wrenches that stood in for it, and within seconds
     the motion is lost: the wrenches are then found anew.
     """
-    there = followed(problem, point)
-    current = None if there is None else evaluate(problem, there)
+    current = _evaluated(problem, followed(problem, point))
     if current is not None and misfit(current) < LOST:
         return current
-    anew = found_from(problem, replace(point, latents=()))
-    other = None if anew is None else evaluate(problem, anew)
+    other = _evaluated(problem, found_from(problem, replace(point, latents=())))
     return min((e for e in (current, other) if e is not None), key=lambda e: e.cost, default=None)
 
 
@@ -145,8 +143,11 @@ def _paying(problem: Problem, current: Evaluation, step: np.ndarray) -> Evaluati
     """As much of a step as pays, with each run's wrench smoothed again; None where nothing of it does."""
     for part in SHORTER:
         moved = moved_by(problem, current, part * step)
-        there = followed(problem, beside(problem, moved, problem, current))
-        new = None if there is None else evaluate(problem, there)
+        new = _evaluated(problem, followed(problem, beside(problem, moved, problem, current)))
         if new is not None and new.cost < current.cost + JITTER:
             return new
     return None
+
+
+def _evaluated(problem: Problem, point: Point | None) -> Evaluation | None:
+    return None if point is None else evaluate(problem, point)

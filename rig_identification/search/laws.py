@@ -28,7 +28,7 @@ def promised_laws(rung: Rung, found: tuple[Candidate, ...]) -> list[Promise]:
 
 def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
     """The effects ``found`` with no part in a law that is not seen. problem: without any effect."""
-    law = next((t for t in found if parts_of(t.candidate)), None)
+    law = _law_of(found)
     if law is None:
         return found
     others = tuple(t.candidate for t in found if t is not law)
@@ -38,12 +38,18 @@ def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
 
 def in_words(best: Explained, found: list[Trial]) -> Explained:
     """What was found with each law told in words: where it acts, how strong, and what it follows."""
-    law = next((t.candidate for t in found if parts_of(t.candidate)), None)
-    if law is None:
+    trial = _law_of(found)
+    if trial is None:
         return best
+    law = trial.candidate
     amount = parts_of(law)[0].name.removeprefix("unknown.")
     findings = tuple(
         law_finding(best.fitted, law, f) if f.effect == law.effect and amount in f.parameters else f
         for f in best.mismatch.findings
     )
     return replace(best, mismatch=replace(best.mismatch, findings=findings))
+
+
+def _law_of(found: list[Trial]) -> Trial | None:
+    """The one that is a law; None where none is."""
+    return next((t for t in found if parts_of(t.candidate)), None)

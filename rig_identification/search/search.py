@@ -124,7 +124,7 @@ def _children(
             budget.leave(c.label for c, _ in asked[k:])
             break
         say(candidate.label)
-        wide, point = _with(rung, candidate, values)
+        wide, point = _entered(rung, rung.problem, rung.evaluation.point, candidate, values)
         there = fitted_at(wide, point, rung.level, FIRST_STEPS)
         if there is not None:
             first.append(Standing(there, (*standing.found, candidate)))
@@ -167,12 +167,16 @@ def worthy(promises: list[Promise], count: int) -> list[Promise]:
     return out
 
 
-def _with(rung: Rung, candidate: Candidate, values: dict[str, float]) -> tuple[Problem, Point]:
-    """The model with one more effect, started at ``values``."""
-    wide = extended(rung.problem, (candidate,))
-    point = carried(wide, rung.problem, rung.evaluation.point)
-    point = promised(wide, point, candidate, values, rung.evaluation)
-    return wide, beside(rung.problem, point, wide, rung.evaluation)
+def _entered(
+    rung: Rung, parent: Problem, point: Point, candidate: Candidate, values: dict[str, float]
+) -> tuple[Problem, Point]:
+    """The ``parent`` with one more effect, started at ``values``, and moving as ``rung`` does.
+
+    point: of the rung, with the internal coordinates of the parent.
+    """
+    wide = extended(parent, (candidate,))
+    there = promised(wide, carried(wide, rung.problem, point), candidate, values, rung.evaluation)
+    return wide, beside(rung.problem, there, wide, rung.evaluation)
 
 
 def _closer(problem: Problem, standing: Standing, say: Callable[[str], None]) -> Iterator[Standing]:
@@ -190,10 +194,8 @@ def _closer(problem: Problem, standing: Standing, say: Callable[[str], None]) ->
         parent = replace(extended(problem, others), discrepancy=rung.problem.discrepancy)
         for closer, values in asked(rung.problem, rung.evaluation):
             say(closer.label)
-            wide = extended(parent, (closer,))
-            point = carried(wide, rung.problem, _without(problem, standing, k))
-            point = promised(wide, point, closer, values, rung.evaluation)
-            down = walked_down(wide, beside(rung.problem, point, wide, rung.evaluation), rung.level)
+            wide, point = _entered(rung, parent, _without(problem, standing, k), closer, values)
+            down = walked_down(wide, point, rung.level)
             if down is not None:
                 yield Standing(down, (*others, closer))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rig_identification.estimate.identify import CAUTION, TIED, Ideal, compose, scores
 from rig_identification.estimate.verdict import hear
-from rig_identification.estimate.without_frame import subtract_frame
+from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.explained import Explained
@@ -70,7 +70,7 @@ class SoFar:
         return replace(
             answer,
             total=total,
-            without_frame=None if frame is None else subtract_frame(total, frame),
+            without_frame=vehicle_alone(total, frame),
             notes=(*(n for n in answer.notes if n not in (CAUTION, TIED)), FOLLOWS),
         )
 
