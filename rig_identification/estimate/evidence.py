@@ -262,10 +262,8 @@ def _mocap_series(series: Series) -> tuple[Series, Array]:
 
 def node_step(rig: Rig, recording: Recording) -> float:
     """Node spacing (s) that a recording's fastest device needs."""
-    fast = (recording.imu, recording.exciter_force, recording.inclination)
-    if not recording.tension and all(series is None for series in fast):
-        return WATCHED_NODE_STEP
-    if _only_turns(recording) and _all_follow(rig, recording, WATCHED_NODE_STEP):
+    if _only_turns(recording):
+        # What a cubic through such nodes does not follow, no swing of a rigid body is either
         return WATCHED_NODE_STEP
     held = _force_step(rig, recording)
     if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.hung_by_eye import TURNS
 from rig_identification.estimate.launch import launch_state
-from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.parameters import INERTIAL, ParameterSet
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.start_state import Doubts, fit_start
@@ -62,14 +62,18 @@ def _bodies(problem: Problem, theta: Array, line: Array, span: float) -> list[Ar
     # Without products of inertia, as large about the vertical as fitted
     J = np.diag(believed[[4, 7, 9]]) * vertical / believed[9]
     gyration = float(np.sqrt(line @ J @ line / mass))
-    # What the rig's errors were bent to belongs to another body
-    kept = np.array([0.0 if p.bounded else 1.0 for p in parameters.free]) * theta[INERTIAL:]
     out = []
     for frequency in np.arange(LOWEST * own, HIGHEST * own, 0.5 / span):
         center = hinges - [0.0, 0.0, depth_of(float(frequency), length, gyration, rig.gravity)]
         elements = np.concatenate([[mass], center, J[np.triu_indices(3)]])
-        out.append(np.concatenate([parameters.start(elements)[:INERTIAL], kept]))
+        out.append(with_body(parameters, theta, parameters.start(elements)))
     return out
+
+
+def with_body(parameters: ParameterSet, theta: Array, body: Array) -> Array:
+    """The vector ``theta`` with another ``body``, the rig as described: its errors were bent to the first."""
+    kept = np.array([0.0 if p.bounded else 1.0 for p in parameters.free]) * theta[INERTIAL:]
+    return np.concatenate([body[:INERTIAL], kept])
 
 
 def ways_of_rolling(problem: Problem, pieces: tuple[Run, ...], theta: Array, rest: State) -> list[Array]:

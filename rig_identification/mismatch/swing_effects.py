@@ -10,11 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig_identification.estimate.cautious import coherence, reweighted
 from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.observability import invert_information
-from rig_identification.estimate.rolling import ways_of_rolling
+from rig_identification.estimate.rolling import ways_of_rolling, with_body
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
@@ -68,11 +69,18 @@ def _fitted(candidate: Candidate, problem: Problem, point: Point, steps: int) ->
     return finished(Trial(candidate, problem, fitted, log_evidence(fitted), True))
 
 
-def _rolling_otherwise(trial: Trial) -> Trial:
-    """The trial with its body rolling otherwise (estimate/rolling.py), where that is likelier."""
+def _ways_of(trial: Trial) -> list[NDArray[np.float64]]:
+    """Bodies that roll as the pieces may show with a trial's effect in the model."""
+    problem, point = trial.problem, trial.evaluation.point
+    return ways_of_rolling(problem, problem.runs, point.theta, point.starts[0])
+
+
+def _rolling_otherwise(trial: Trial, ways: list[NDArray[np.float64]]) -> Trial:
+    """The trial with its body rolling in one of several ways, where that is likelier."""
     problem, point = trial.problem, trial.evaluation.point
     best = trial
-    for theta in ways_of_rolling(problem, problem.runs, point.theta, point.starts[0]):
+    for way in ways:
+        theta = with_body(problem.bench.parameters, point.theta, way)
         starts = launch_states(problem.bench, problem.runs, theta, point.starts[0])
         start = replace(point, theta=theta, starts=starts)
         again = _fitted(trial.candidate, problem, start, 2 * STEPS)
@@ -167,9 +175,10 @@ def damped(
         return None
     notify("search: how it rolls", 0.3)
     # Fitted to a body that rolls as it does not, what stops a swing is bent to next to nothing
-    first = max(
-        map(_rolling_otherwise, _each_kind(tried, log_evidence(evaluation))), key=lambda t: t.evidence
-    )
+    # At which frequency it rolls does not depend on what damps it
+    ways = _ways_of(tried[0])
+    kinds = _each_kind(tried, log_evidence(evaluation))
+    first = max((_rolling_otherwise(trial, ways) for trial in kinds), key=lambda t: t.evidence)
     held = _better(first.problem, first.evaluation, holds, count, told(0.35))
     others = tuple(c for c in candidates if c not in holds)
     choice = Choice((first.candidate,), (), others, tuple(tried))

@@ -6,15 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import AXES
-from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.findings import pushed, written
-from rig_identification.mismatch.latent import MissingWrench, joined, missing_wrench, strongest_push
+from rig_identification.mismatch.latent import MissingWrench, strongest_push
 from rig_identification.mismatch.law import law_of
-from rig_identification.mismatch.locate import DRIVE, Event
+from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.riders import middle_of
-from rig_identification.model.motion import State
 from rig_identification.quantity import plain_figure
 from rig_identification.result import Finding
+from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -22,50 +21,19 @@ Array = NDArray[np.float64]
 SMEARED = 0.02
 
 
-def missing_in(
-    problem: Problem, evaluation: Evaluation, rest: State, mass: float, which: list[int]
-) -> MissingWrench | None:
-    """The missing wrench in some of a problem's runs, those of the recording of the first."""
-    parts = []
-    for i in which:
-        if problem.runs[i].recording.name == problem.runs[which[0]].recording.name:
-            found = missing_wrench(problem.bench, problem.runs[i], evaluation.point.theta, rest, mass)
-            if found is not None:
-                parts.append(found)
-    return joined(parts) if parts else None
-
-
-def push_finding(
-    problem: Problem, evaluation: Evaluation, rest: State, mass: float, event: Event
-) -> tuple[Finding, float, float] | None:
-    """The event as an external force: the finding without evidence, and when it starts and ends (s)."""
-    inside = [
-        i
-        for i, run in enumerate(problem.runs)
-        if run.recording.name == event.recording and event.start - 1e-6 <= run.offset < event.end - 1e-6
-    ]
-    missing = missing_in(problem, evaluation, rest, mass, inside)
-    if missing is None:
-        return None
-    push = strongest_push(missing, middle_of(problem.bench.rig))
+def push_finding(missing: MissingWrench, rig: Rig) -> Finding:
+    """The strongest course of a missing wrench as an external force, without evidence."""
+    push = strongest_push(missing, middle_of(rig))
     stds = np.full(3, np.hypot(push.std, SMEARED * push.size))
-    told = pushed(event.recording, push.start, push.end, push.peak, stds, push.point)
-    return told, push.start, push.end
+    return pushed(missing.recording, push.start, push.end, push.peak, stds, push.point)
 
 
-def unknown_finding(
-    problem: Problem, evaluation: Evaluation, rest: State, mass: float, device: str | None
-) -> Finding | None:
+def missing_finding(missing: MissingWrench, rig: Rig, device: str | None) -> Finding:
     """Where, when and how strong whatever is left is, and the wrench over time that stands in its place.
 
     device: without which everything else agrees, if there is one.
     """
-    squares = [float(np.sum(run.residual**2) - run.residual.size) for run in evaluation.runs]
-    order = [int(i) for i in np.argsort(squares)[::-1][:3]]
-    missing = missing_in(problem, evaluation, rest, mass, order)
-    if missing is None:
-        return None
-    middle = middle_of(problem.bench.rig)
+    middle = middle_of(rig)
     push = strongest_push(missing, middle)
     world = np.einsum("nij,nj->ni", missing.R_world_body, missing.wrench[:, :3])
     strength = np.sqrt(np.mean((world - np.mean(world, axis=0)) ** 2, axis=0))

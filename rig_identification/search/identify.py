@@ -15,7 +15,6 @@ from rig_identification.estimate.identify import (
     compose,
     fit_session,
     judged,
-    near_noise,
     only_watched,
     scores,
     with_pieces,
@@ -27,8 +26,6 @@ from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.mismatch.budget import Budget
-from rig_identification.mismatch.explain import explain
-from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
@@ -37,7 +34,7 @@ from rig_identification.mismatch.watched import Watched, explain_watched
 from rig_identification.model.work import WORK, counted
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted
-from rig_identification.search.search import search
+from rig_identification.search.explain import explain
 from rig_identification.search.so_far import SoFar, accounted, both_accounted, interrupted, with_work_told
 
 Progress = Callable[[str, float], None]
@@ -140,21 +137,6 @@ def _worth_a_search(watched: Watched) -> bool:
     return watched.mismatch.verdict == "unexplained" and misfit(watched.fitted.evaluation) < HOPELESS_SQUARE
 
 
-def _followed(so_far: SoFar, notify: Progress) -> Explained | None:
-    """What explains the session with a random wrench on the way; None where nothing does, or no fit holds."""
-    try:
-        found, so_far.rung = search(so_far.ideal, notify, so_far.budget, so_far.hear)
-        return found
-    except (FloatingPointError, np.linalg.LinAlgError):
-        return None
-
-
-def _answered(ideal: Ideal, found: Explained | None) -> bool:
-    """Whether nothing is left to be explained."""
-    verdict = ideal.mismatch.verdict if found is None else found.mismatch.verdict
-    return verdict != "unexplained"
-
-
 def _identified(
     session: Session, notify: Progress, assumed: Assumed | None, work: float
 ) -> tuple[Identification, Fitted]:
@@ -179,19 +161,7 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
         notify(stage, IDEAL_SHARE + (1.0 - IDEAL_SHARE) * fraction)
 
     session, ideal, budget = so_far.session, so_far.ideal, so_far.budget
-    fitted = ideal.fitted
-    spells, named = spells_of(fitted), None
-    # What is only watched tells no wrench, and through a slack spell none goes on
-    followed = bool(fitted.problem.runs) and not spells and not only_watched(fitted.problem)
-    if not spells and not near_noise(fitted):
-        if followed:
-            # Where much is left a model follows the data with a discrepancy, and none has to by itself
-            named = _followed(so_far, searching)
-            if named is not None and named.wholly:
-                return so_far.with_findings(named, _plain(so_far))
-        ideal = so_far.ideal = with_pieces(ideal, searching)
-    plain = _plain(so_far)
-    swinging = None
+    plain, swinging = _plain(so_far), None
     if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
         ideal = so_far.ideal = with_pieces(ideal, searching)
         watched = _watched(ideal, searching)
@@ -202,15 +172,11 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
     found, note = None, None
     if ideal.fitted.problem.runs:
         try:
-            found = explain(ideal, spells, searching, budget, so_far.hear)
+            found = explain(ideal, spells_of(ideal.fitted), searching, budget, so_far.hear, so_far.see)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
     if swinging is not None and (found is None or not (found.told or found.mismatch.verdict == "none")):
         return swinging
-    if followed and near_noise(fitted) and not _answered(ideal, found):
-        named = _followed(so_far, searching)
-    if named is not None and not _answered(ideal, found):
-        return so_far.with_findings(named, plain)
     if found is None:
         ideal = so_far.ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)

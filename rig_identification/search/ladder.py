@@ -76,6 +76,17 @@ def begun(problem: Problem, point: Point) -> Rung | None:
     return None if found is None else walked_down(problem, found, 0)
 
 
+def climbed(problem: Problem, evaluation: Evaluation) -> Rung:
+    """A model near the noise at its own level, from where it stands alone. evaluation: of the problem."""
+    best = Rung(problem, evaluation, ALONE)
+    for level in reversed(range(ALONE)):
+        rung = fitted_at(problem, replace(best.evaluation.point, latents=()), level, PASSING)
+        if rung is None or rung.evidence < best.evidence:
+            break
+        best = rung
+    return best
+
+
 def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
     """The model at the level that the evidence asks for, from ``level`` on; None where it cannot be fitted.
 

@@ -46,6 +46,10 @@ class SoFar:
         if found.wholly or self.found is None or not self.found.wholly:
             self.found = found
 
+    def see(self, rung: Rung) -> None:
+        """Keep the last model with a discrepancy."""
+        self.rung = rung
+
     def with_findings(self, found: Explained, plain: Identification) -> Identification:
         """The answer with what was found in the model, each finding weighed. plain: the ideal model's."""
         return self._composed(each_by_itself(found, self.budget.late), plain)

@@ -1,0 +1,199 @@
+"""Something that acts for seconds and is gone: found in the wrench's course, and left out of the fit.
+
+What is wrong all the time is in the wrench all the time. What pushes for a second is in it for that second.
+Near the noise no wrench is asked for, and the push that whole runs show most of (mismatch/pulse.py) is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import Ideal, fitted_again, judged, near_noise
+from rig_identification.estimate.solve import excess
+from rig_identification.estimate.whole import fit_whole
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
+from rig_identification.mismatch.latent import MissingWrench
+from rig_identification.mismatch.pulse import Pulse, likeliest_pulse, pulse_finding
+from rig_identification.mismatch.unknown import push_finding
+from rig_identification.result import Finding, Mismatch
+from rig_identification.search.ladder import Rung
+from rig_identification.search.unexplained import missing_wrenches
+
+Array = NDArray[np.float64]
+Notify = Callable[[str, float], None]
+#: Explains what an event leaves of a session; None where the ideal model explains it.
+Explain = Callable[[Ideal], Explained | None]
+
+#: What is cut off on either side of an event, s.
+MARGIN = 0.15
+#: Share of what is wrong that may be left outside of an event for it to be the chief of it.
+OUTSIDE = 0.5
+#: Share of what a model leaves that a push beside it has to take away, to first order.
+SEEN = 0.25
+#: Seconds over which the wrench is averaged.
+BIN = 0.25
+#: A push stands out of the wrench at all other times by this factor (of its square), in one stretch of so
+#: much of the time at most: what swings, rubs or lags comes to as much again and again.
+STANDS_OUT, FOR = 5.0, 0.2
+#: Bins on either side of what stands out in which it may begin and end.
+ABOUT = 2
+
+
+@dataclass(frozen=True)
+class Event:
+    """Seconds of one recording in which something acts that the rest of it does not show."""
+
+    recording: str
+    start: float  # s after the recording's start
+    end: float  # s
+    pulse: Pulse | None = None  # as whole runs near the noise show it
+    missing: MissingWrench | None = None  # the wrench in which it was seen
+
+    def inside(self, pulse: Pulse | None) -> Pulse | None:
+        """The pulse if it acts at some time of the event."""
+        return pulse if pulse is not None and pulse.within(self.recording, self.start, self.end) else None
+
+
+def event_of(ideal: Ideal, first: Rung) -> Event | None:
+    """The event that is chief of what the ideal model leaves; None where there is none.
+
+    first: that model at its own level.
+    """
+    fitted = ideal.fitted
+    if near_noise(fitted):
+        pulse = likeliest_pulse(fitted)
+        chief = pulse is not None and pulse.net > (1.0 - OUTSIDE) * wrong(fitted)
+        return _of_pulse(pulse) if pulse is not None and chief else None
+    return standing_out(first)
+
+
+def event_beside(found: Explained) -> Event | None:
+    """The event that a fit with something in its model shows in whole runs; None where there is none."""
+    if not near_noise(found.fitted):
+        return None
+    pulse = likeliest_pulse(found.fitted)
+    shows = pulse is not None and pulse.net > SEEN * wrong(found.fitted)
+    return _of_pulse(pulse) if pulse is not None and shows else None
+
+
+def _of_pulse(pulse: Pulse) -> Event:
+    return Event(pulse.recording, pulse.start, pulse.end, pulse)
+
+
+def standing_out(rung: Rung) -> Event | None:
+    """The one stretch in which the wrench of a model stands out of its wrench at all other times, or None."""
+    if rung.alone or rung.problem.discrepancy is None:
+        return None
+    size = np.sqrt(np.diag(rung.problem.discrepancy.covariance))
+    every = missing_wrenches(rung)
+    rows, place = [], []
+    for missing in every:
+        bins = max(1, int((missing.time[-1] - missing.time[0]) / BIN))
+        parts = zip(np.array_split(missing.wrench, bins), np.array_split(missing.time, bins), strict=True)
+        for wrench, time in parts:
+            rows.append(np.mean(wrench, axis=0) / size)
+            place.append((missing, float(time[0]), float(time[-1])))
+    wrench = np.array(rows)
+    stretch = _stretch(np.sum((wrench - np.median(wrench, axis=0)) ** 2, axis=1))
+    if stretch is None:
+        return None
+    first, last = stretch[0] - ABOUT, stretch[1] + ABOUT
+    if first < 0 or last > len(place) or place[first][0] is not place[last - 1][0]:
+        # What begins or dies away stands out at a recording's end as well
+        return None
+    missing = place[first][0]
+    return Event(missing.recording, place[first][1], place[last - 1][2], None, missing)
+
+
+def _stretch(squares: Array) -> tuple[int, int] | None:
+    """First bin, and the one after the last, of the one stretch that stands out; None where none does."""
+    high = np.flatnonzero(squares > np.max(squares) / STANDS_OUT)
+    first, last = int(high[0]), int(high[-1]) + 1
+    return (first, last) if last - first <= FOR * squares.size else None
+
+
+def explained_outside(
+    ideal: Ideal, event: Event, explain: Explain, notify: Notify, *, chief: bool
+) -> Explained | None:
+    """What explains the session outside of an event, and the event; None where something is left there.
+
+    chief: the event has the larger part of what is wrong, and comes first; otherwise it comes last.
+    """
+    notify(f"search: {event.recording} without a push at {event.start:.1f} s", 0.1)
+    fitted = ideal.fitted
+    runs = all_without(fitted.problem.runs, event)
+    held = all_without(fitted.holdout_runs, event)
+    if not runs:
+        return None
+    again = fitted_again(ideal, runs, (*held, *fitted.lost), notify)
+    if chief and wrong(again) > OUTSIDE * wrong(fitted):
+        return None
+    rest = Ideal(again, *judged(again))
+    found = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
+    if found.mismatch.verdict not in ("none", "explained") or found.trace:
+        return None
+    whole = _everything(found, ideal)
+    if judged(whole)[1].verdict == "none":
+        # A fit lost its way without what was found
+        return replace(found, fitted=whole) if found.told else None
+    after = judged(found.fitted)[0].holdout
+    pulse = event.inside(likeliest_pulse(whole)) or event.pulse
+    gain = float(wrong(ideal.fitted) - wrong(found.fitted)) if pulse is None else pulse.gain
+    evidence = {**evidence_of(ideal, found.fitted, after), "log_likelihood_gain": gain}
+    push = replace(_told(event, pulse, ideal), evidence=evidence)
+    findings = (push, *found.mismatch.findings) if chief else (*found.mismatch.findings, push)
+    text = f"Outside the push: {found.mismatch.explanation} {held_out_errors(ideal.scores.holdout, after)}"
+    alternatives = found.mismatch.alternatives if found.mismatch.findings else ()
+    return replace(found, mismatch=Mismatch("explained", text, findings, alternatives), ideal=ideal)
+
+
+def _told(event: Event, pulse: Pulse | None, ideal: Ideal) -> Finding:
+    """The event as a finding without evidence: as whole runs show it, or else as the wrench does."""
+    if pulse is not None:
+        return pulse_finding(pulse)
+    missing = event.missing
+    if missing is None:
+        raise AssertionError("an event was seen in a pulse or in a wrench")
+    return push_finding(missing, ideal.fitted.problem.bench.rig)
+
+
+def _everything(found: Explained, ideal: Ideal) -> Fitted:
+    """All of every run with the model found outside of an event."""
+    outside = found.fitted
+    whole = replace(outside.problem, runs=ideal.fitted.problem.runs)
+    return fit_whole(ideal.fitted, whole, outside.problem, outside.evaluation.point)
+
+
+def wrong(fitted: Fitted) -> float:
+    """Excess (nats) of all runs, held-out ones included."""
+    held = sum(0.5 * float(np.sum(run.residual**2) - run.residual.size) for run in fitted.holdouts)
+    return max(1.0, excess(fitted.evaluation) + held)
+
+
+def all_without(runs: tuple[Run, ...], event: Event) -> tuple[Run, ...]:
+    """The stretches of all runs before and after an event."""
+    return tuple(part for run in runs for part in _without(run, event))
+
+
+def _without(run: Run, event: Event) -> list[Run]:
+    """A run's stretches before and after an event, where they are long enough to say something."""
+    if run.recording.name != event.recording:
+        return [run]
+    step = run.grid.step
+    a = round((event.start - MARGIN - run.offset) / step)
+    b = round((event.end + MARGIN - run.offset) / step)
+    if b <= 0 or a >= run.grid.nodes - 1:
+        # Another stretch of the recording, from before or after the event
+        return [run]
+    out = []
+    if a * step > 1.0:
+        out.append(run.between(0, a))
+    if (run.grid.nodes - 1 - b) * step > 1.0:
+        out.append(run.between(b, run.grid.nodes - 1))
+    return out

@@ -1,0 +1,248 @@
+"""Models with one more effect: screened where the model at hand stands, the best fitted and walked down.
+
+All hypotheses are compared by one number, the evidence, each with the discrepancy that it asks for itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig_identification.estimate.identify import ORDINARY
+from rig_identification.estimate.solve import Point, Problem
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.hypotheses import compatible, count_of, net_gain
+from rig_identification.mismatch.late import lag_like
+from rig_identification.mismatch.same_clock import contradicted
+from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.simpler import special_cases
+from rig_identification.mismatch.trial import (
+    Trial,
+    attempt,
+    beyond_doubt,
+    mass_of,
+    ordinary_errors,
+    possible,
+    promised,
+)
+from rig_identification.model.motion import State
+from rig_identification.search.ladder import Rung, fitted_at, walked_down
+from rig_identification.search.laws import promised_laws
+from rig_identification.search.path import beside
+
+#: Is told what is being fitted.
+Say = Callable[[str], None]
+
+#: Hypotheses that are fitted after each screening, of each kind so many, and how many to their own level.
+FITTED, ALIKE, WALKED = 5, 2, 3
+#: Share of the best promise that another one has to come to.
+SHARE = 0.1
+#: Share of the evidence that another one has gained already: first order is right within a factor of two.
+REACHED = 0.5
+#: Log evidence by which a hypothesis trails at the same level (odds of 1 to 20,000) that is no rival.
+RIVAL = 10.0
+#: Steps of the first fit of each: an amount as large as it may be takes three or four to settle.
+FIRST_STEPS = 4
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Effects in the model, and the model at its own level."""
+
+    rung: Rung
+    found: tuple[Candidate, ...] = ()
+
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood less a constant, each effect as likely beforehand wherever it is."""
+        return self.rung.evidence - float(sum(np.log(c.places) for c in self.found))
+
+    @property
+    def label(self) -> str:
+        """Names of its effects."""
+        return ", ".join(c.label for c in self.found)
+
+    def trial(self, candidate: Candidate) -> Trial:
+        """One of its effects, as fits without a discrepancy have it."""
+        there = replace(self.rung.evaluation, point=replace(self.rung.evaluation.point, latents=()))
+        return Trial(candidate, self.rung.model, there, self.evidence, settled=True)
+
+
+def children(
+    problem: Problem,
+    standing: Standing,
+    candidates: list[Candidate],
+    budget: Budget,
+    say: Say,
+    promises: list[Promise] | None = None,
+) -> list[Standing]:
+    """Models with one more effect, each at its own level, likeliest first. problem: without any effect.
+
+    promises: about ``standing``, where they are known. Once the ``budget`` is spent no further hypothesis is
+    fitted.
+    """
+    rung = standing.rung
+    left = compatible(candidates, list(standing.found))
+    if promises is None:
+        say("screening")
+        promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
+        promises += promised_laws(rung, standing.found)
+    first = _first_fits(standing, worthy(promises, count_of(candidates)), budget, say)
+    first += _alike(standing, first, left, budget, say)
+    first = [child for child in first if not contradicted(_last_of(child))]
+    first.sort(key=lambda child: -child.rung.within_reach)
+    walked: list[Standing] = []
+    for child in first[:WALKED]:
+        if walked and budget.spent():
+            break
+        explains = [w.found[-1].kind for w in walked if w.rung.alone]
+        if explains and child.rung.within_reach < first[0].rung.evidence - RIVAL:
+            break
+        if child.found[-1].kind in explains:
+            # The same effect, of which a closer description explains all
+            continue
+        say(child.found[-1].label)
+        down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
+        if down is not None:
+            walked.append(replace(child, rung=down))
+            walked += _closer(problem, walked[-1], say)
+    ordinary = ordinary_errors(problem)
+    return sorted((s for s in walked if _makes_sense(s, ordinary)), key=lambda s: -s.evidence)
+
+
+def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say: Say) -> list[Standing]:
+    """First fits of promises, what is fitted soon before what is fitted in ten times the time."""
+    asked = list(_with_twins(sorted(promises, key=lambda p: p.candidate.slow)))
+    first: list[Standing] = []
+    gained = 0.0
+    for k, promise in enumerate(asked):
+        if budget.spent():
+            budget.leave(p.candidate.label for p in asked[k:])
+            break
+        if promise.gain < REACHED * gained:
+            continue
+        child = _begun(standing, promise, budget, say)
+        if child is not None:
+            first.append(child)
+            gained = max(gained, child.rung.evidence - standing.rung.evidence)
+    return first
+
+
+def _begun(standing: Standing, promise: Promise, budget: Budget, say: Say) -> Standing | None:
+    """The first fit with one more effect, at the level of ``standing``; None where it cannot be followed."""
+    rung, candidate = standing.rung, promise.candidate
+    say(candidate.label)
+    if rung.alone:
+        begun = attempt(rung.problem, rung.evaluation, promise, budget)
+        if begun is None:
+            return None
+        fitted = Rung(begun.problem, begun.evaluation, rung.level)
+        return Standing(fitted, (*standing.found, begun.candidate))
+    wide, point = _entered(rung, rung.problem, rung.evaluation.point, candidate, promise.values)
+    there = fitted_at(wide, point, rung.level, FIRST_STEPS)
+    return None if there is None else Standing(there, (*standing.found, candidate))
+
+
+def _alike(
+    standing: Standing, first: list[Standing], left: list[Candidate], budget: Budget, say: Say
+) -> list[Standing]:
+    """What the best first fit is alike to: special cases of it, and the lag beside a late clock."""
+    if not first or budget.spent():
+        return []
+    best = max(first, key=lambda child: child.rung.within_reach)
+    known = {child.found[-1].label for child in first}
+    trial = best.trial(best.found[-1])
+    lag = lag_like(trial, left)
+    asked = [Promise(c, 0.0, trial.values) for c in special_cases(trial.candidate, left)]
+    asked += [] if lag is None else [lag]
+    alike = (_begun(standing, p, budget, say) for p in asked if p.candidate.label not in known)
+    return [child for child in alike if child is not None]
+
+
+def _makes_sense(standing: Standing, ordinary: dict[str, float]) -> bool:
+    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary.
+
+    """
+    trial = _last_of(standing)
+    return possible(trial) and beyond_doubt(trial, ordinary, ORDINARY)
+
+
+def _last_of(standing: Standing) -> Trial:
+    """The last effect, as the model with the discrepancy has it."""
+    rung = standing.rung
+    return Trial(standing.found[-1], rung.problem, rung.evaluation, standing.evidence, settled=True)
+
+
+def _with_twins(promises: list[Promise]) -> Iterator[Promise]:
+    """What is fitted: each promise, and what first order cannot tell from it."""
+    for promise in promises:
+        yield promise
+        for candidate, values in promise.candidate.twins:
+            yield replace(promise, candidate=candidate, values=values)
+
+
+def worthy(promises: list[Promise], count: int) -> list[Promise]:
+    """The promises worth a fit: of each kind the best ones, as many as are fitted."""
+    out: list[Promise] = []
+    for promise in sorted(promises, key=lambda p: -net_gain(p, count)):
+        if net_gain(promise, count) <= 0.0 or len(out) == FITTED:
+            break
+        if out and promise.gain < SHARE * out[0].gain:
+            break
+        if sum(promise.candidate.kind == other.candidate.kind for other in out) < ALIKE:
+            out.append(promise)
+    return out
+
+
+def _entered(
+    rung: Rung, parent: Problem, point: Point, candidate: Candidate, values: dict[str, float]
+) -> tuple[Problem, Point]:
+    """The ``parent`` with one more effect, started at ``values``, and moving as ``rung`` does.
+
+    point: of the rung, with the internal coordinates of the parent.
+    """
+    wide = extended(parent, (candidate,))
+    there = promised(wide, carried(wide, rung.problem, point), candidate, values, rung.evaluation)
+    return wide, beside(rung.problem, there, wide, rung.evaluation)
+
+
+def _closer(problem: Problem, standing: Standing, say: Say) -> Iterator[Standing]:
+    """The model with closer descriptions of its effects that first order cannot tell from them.
+
+    Each takes the place of its effect. With a second effect in the model a closer description of the first
+    one may be the likelier one. problem: without any effect.
+    """
+    rung = standing.rung
+    for k, candidate in enumerate(standing.found):
+        asked = candidate.between or candidate.closer
+        if asked is None:
+            continue
+        others = (*standing.found[:k], *standing.found[k + 1 :])
+        parent = replace(extended(problem, others), discrepancy=rung.problem.discrepancy)
+        for closer, values in asked(rung.problem, rung.evaluation):
+            say(closer.label)
+            wide, point = _entered(rung, parent, _without(problem, standing, k), closer, values)
+            down = walked_down(wide, point, rung.level)
+            if down is not None:
+                yield Standing(down, (*others, closer))
+
+
+def _without(problem: Problem, standing: Standing, left_out: int) -> Point:
+    """The point without what one of the effects moves within the rig. problem: without any effect."""
+    model = problem.bench.parameters.model
+    kept = [True] * model.internal
+    for k, candidate in enumerate(standing.found):
+        wider, _ = candidate.built(model)
+        kept += [k != left_out] * (wider.internal - model.internal)
+        model = wider
+    point, stay = standing.rung.evaluation.point, np.array(kept + kept, dtype=bool)
+
+    def own(state: State) -> State:
+        return replace(state, internal=state.internal[stay]) if state.internal.size == stay.size else state
+
+    return replace(
+        point, starts=tuple(map(own, point.starts)), rest_guesses=tuple(map(own, point.rest_guesses))
+    )

@@ -1,0 +1,132 @@
+"""The session with what was left out in the model: located, named, fitted, judged on held-out runs, told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rig_identification.estimate.identify import Ideal, only_watched
+from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
+from rig_identification.mismatch.screen import screen
+from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
+from rig_identification.mismatch.standing import Heard, unheard
+from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.undecided import undecided
+from rig_identification.search.events import event_beside, event_of, explained_outside, standing_out
+from rig_identification.search.ladder import Rung
+from rig_identification.search.levels import ALONE
+from rig_identification.search.search import Outcome, first_rung, problem_of, search
+from rig_identification.search.unexplained import unexplained
+
+Notify = Callable[[str, float], None]
+#: Is told the last model with a discrepancy.
+Seen = Callable[[Rung], None]
+
+
+def explain(
+    ideal: Ideal,
+    spells: list[Spell],
+    notify: Notify,
+    budget: Budget,
+    heard: Heard = unheard,
+    seen: Seen = lambda rung: None,
+) -> Explained | None:
+    """Search for what the ideal model leaves out; None where every residual is noise, or no run is followed.
+
+    spells: in which a cable carries nothing (slack.py). budget: how much it may compute. heard: is told what
+    explains the session, as it is found.
+    """
+    if ideal.mismatch.verdict == "none":
+        return _hidden(ideal, notify, budget)
+    if not spells:
+        return _explain(ideal, notify, budget, heard, seen)
+    notify("search: stretches in which every cable pulls", 0.02)
+    taut = taut_ideal(ideal, spells, notify)
+    if taut is None:
+        return slack_alone(ideal, spells)
+    found = explain(taut, [], notify, budget)
+    return with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
+
+
+def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
+    """What no residual shows by itself, and a hypothesis that knows what to look for does.
+
+    A score test of all hypotheses at once: one among ever so many that gains more than chance does is fitted,
+    and told if it explains every run. Otherwise what may be there beside nothing is stated.
+    """
+    notify("search: anything within the noise", 0.1)
+    problem, evaluation = problem_of(ideal), ideal.fitted.evaluation
+    candidates = catalogue(problem)
+    promises = screen(problem, evaluation, candidates, mass_of(problem, evaluation))
+    count = count_of(candidates)
+    if worth_a_fit(promises, count):
+        found = search(ideal, Rung(problem, evaluation, ALONE), notify, budget, promises=promises).told
+        if found is not None and found.wholly:
+            return found
+    return undecided(ideal, problem, evaluation, promises, count, notify, budget)
+
+
+def _explain(
+    ideal: Ideal, notify: Notify, budget: Budget, heard: Heard, seen: Seen, *, part: bool = False
+) -> Explained | None:
+    """The search, on runs in which every cable pulls.
+
+    part: these are what an event leaves of them; None then also where they are not explained.
+    """
+
+    def rest_explained(rest: Ideal) -> Explained | None:
+        if rest.mismatch.verdict == "none":
+            return _hidden(rest, notify, budget)
+        return _explain(rest, notify, budget, unheard, lambda rung: None, part=True) or _nothing(rest)
+
+    notify("search: the motion as recorded", 0.05)
+    first = _first(ideal)
+    if first is None:
+        return None
+    # A body that is only watched tells no wrench, and where it swings free is known (segments.py)
+    watched = only_watched(ideal.fitted.problem)
+    if not watched:
+        seen(first)
+    event = None if watched else event_of(ideal, first)
+    if event is not None:
+        found = explained_outside(ideal, event, rest_explained, notify, chief=True)
+        if found is not None:
+            return found
+    outcome = search(ideal, first, notify, budget, heard)
+    if outcome.told is not None or watched:
+        return outcome.told
+    seen(outcome.likeliest.rung)
+    found = _beside(ideal, outcome, rest_explained, notify, budget)
+    if found is not None or part:
+        return found
+    return unexplained(ideal, outcome, budget, notify)
+
+
+def _nothing(rest: Ideal) -> Explained:
+    """What is left of a session, unexplained."""
+    return Explained(rest.fitted, rest.mismatch, rest)
+
+
+def _first(ideal: Ideal) -> Rung | None:
+    try:
+        return first_rung(ideal)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _beside(
+    ideal: Ideal,
+    outcome: Outcome,
+    rest_explained: Callable[[Ideal], Explained | None],
+    notify: Notify,
+    budget: Budget,
+) -> Explained | None:
+    """What explains the session outside of an event that shows with the likeliest effects in the model."""
+    if budget.spent() or not outcome.likeliest.found:
+        return None
+    event = None if outcome.partly is None else event_beside(outcome.partly)
+    event = event or standing_out(outcome.likeliest.rung)
+    return None if event is None else explained_outside(ideal, event, rest_explained, notify, chief=False)
