@@ -11,7 +11,6 @@ from scipy.stats import chi2
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
-from rig_identification.mismatch.amounts import WORTH
 from rig_identification.mismatch.bent_cells import bent_cells
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
@@ -25,11 +24,6 @@ from rig_identification.mismatch.sensor_errors import sensor_errors
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3
-#: Hypotheses that get their first steps after each screening; to those that are not slow, slow ones are none.
-FITTED = 4
-#: Of these, at most so many of one effect: its other places are its rivals anyway; and of one with as many
-#: parameters of its own as a hose or a rider has, whose fits are slow and whose place is found already.
-ALIKE, ALIKE_IF_MANY = 3, 2
 
 
 def catalogue(problem: Problem) -> list[Candidate]:
@@ -92,46 +86,3 @@ def needed_gain(candidate: Candidate, count: int) -> float:
 def net_gain(promise: Promise, count: int) -> float:
     """What a promise gains (nats) beyond what noise gives one of ``count``."""
     return promise.gain - needed_gain(promise.candidate, count)
-
-
-def worth_a_fit(promises: list[Promise], count: int, device: str | None = None) -> list[Promise]:
-    """The promises worth a fit, of ``count`` that were made; those of one device where it is known to lie.
-
-    A steady pull, of six numbers, bends to any cell's zero or a level: it is worth one where it is likelier.
-    """
-    single = max((net_gain(p, count) for p in promises if not p.steady), default=0.0)
-    worthy = [p for p in promises if net_gain(p, count) > (max(single, 0.0) if p.steady else 0.0)]
-    # A cell that bends, or that feels its neighbour, promises whatever its zero does, and a little more
-    worthy.sort(key=lambda p: -net_gain(p, count))
-    most = max((p.gain for p in worthy), default=0.0)
-    if device is not None:
-        worthy = [p for p in worthy if p.candidate.where.get("channel") == device] or worthy
-    out: list[Promise] = []
-    for p in worthy:
-        alike = sum(q.candidate.kind == p.candidate.kind for q in out)
-        places = ALIKE_IF_MANY if p.candidate.many else ALIKE
-        # A hose's nine numbers promise more of anything, and take no place from what is fitted in a second
-        others = out if p.candidate.slow else [q for q in out if not q.candidate.slow]
-        if p.gain > WORTH * most and alike < places and len(others) < FITTED:
-            out.append(p)
-    return out
-
-
-def as_likely(promises: list[Promise], worthy: list[Promise], meant: float) -> list[Promise]:
-    """Near the noise: of effects without a promise among the ``worthy``, the best that are about as likely.
-
-    An effect is as likely beforehand wherever it is: a level that promises less than one hinge of twenty-four
-    may be as likely as that, and is told beside it. What takes long to fit is not. meant: nats that count.
-    """
-
-    def likely(promise: Promise) -> float:
-        return promise.gain - float(np.log(promise.candidate.places))
-
-    least = max(map(likely, worthy), default=np.inf) - meant
-    seen = {p.candidate.kind for p in worthy}
-    out: list[Promise] = []
-    for p in promises:
-        if p.candidate.kind not in seen and not p.candidate.slow and likely(p) > least:
-            seen.add(p.candidate.kind)
-            out.append(p)
-    return out

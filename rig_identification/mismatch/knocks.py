@@ -35,7 +35,6 @@ from scipy.stats import chi2
 
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
-from rig_identification.mismatch.amounts import CHIEF
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.loose import beyond_of
 from rig_identification.mismatch.response import instant_information, whitened_response
@@ -43,6 +42,9 @@ from rig_identification.model import layout
 from rig_identification.model.motion import Motion
 
 Array = NDArray[np.float64]
+
+#: Share that counts as the larger part.
+CHIEF = 0.5
 
 RATE, FORCE, ALPHA = layout.OUT_RATE, layout.OUT_SPECIFIC_FORCE, layout.OUT_ANGULAR_ACCELERATION
 #: What lasts longer than this (s) is no blow; blows closer than the other are one.

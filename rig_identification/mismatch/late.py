@@ -34,11 +34,6 @@ def lag_like(clock: Trial, candidates: Sequence[Candidate]) -> Promise | None:
     return None
 
 
-def twins(one: Candidate, other: Candidate) -> bool:
-    """Whether one is a clock and the other a lag: only where the body moves are they told apart."""
-    return {one.effect, other.effect} == {"clock_offset", "sensor_lag"}
-
-
 def told_apart(done: Sequence[Trial], meant: float) -> list[Trial]:
     """Trials, most likely first, a lag before a clock only where the motion says so.
 

@@ -7,18 +7,10 @@ is not fitted to it, so that it cannot be bent to swallow it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.launch import launch_state
-from rig_identification.estimate.prediction import Bench, linearise_run
-from rig_identification.estimate.start_state import fit_start
-from rig_identification.estimate.track import smoothed_from, wrench_noise
-from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
@@ -39,43 +31,6 @@ class MissingWrench:
     wrench: Array  # (N, 6) N and N m about the datum, body axes, averaged over AVERAGED
     R_world_body: Array  # (N, 3, 3)
     states: Array  # (N, 12) motion as smoothed
-
-
-def missing_wrench(bench: Bench, run: Run, theta: Array, rest: State, mass: float) -> MissingWrench | None:
-    """Smooth the missing wrench of one run at parameters ``theta``; None where it cannot be followed."""
-    size = float(np.max(extent(bench.rig)))
-    step = run.grid.step
-    noise = wrench_noise(mass, bench.rig.gravity, 0.3 * size, step, SHARE)
-    start = launch_state(bench, run, theta, rest, noise)
-    found = fit_start(bench, run, theta, start, tolerance=0.1, extra_noise=noise)
-    if found is None:
-        return None
-    linearised = linearise_run(bench, run, theta, found[1], start_only=True, extra_noise=noise)
-    if linearised is None:
-        return None
-    corrections, wrenches = smoothed_from(linearised, *LAUNCHED)
-    width = max(1, round(AVERAGED / step))
-    kernel = np.ones(width) / width
-    averaged: Array = np.stack([np.convolve(w, kernel, mode="same") for w in wrenches.T], axis=1)
-    return MissingWrench(
-        run.recording.name,
-        np.asarray(run.offset + step * np.arange(run.grid.nodes), dtype=np.float64),
-        averaged,
-        linearised.motion.R_world_body,
-        linearised.motion.states[:, :12] + corrections[:, :12],
-    )
-
-
-def joined(parts: list[MissingWrench]) -> MissingWrench:
-    """Pieces of one recording, one after the other."""
-    parts = sorted(parts, key=lambda p: p.time[0])
-    return replace(
-        parts[0],
-        time=np.concatenate([p.time for p in parts]),
-        wrench=np.concatenate([p.wrench for p in parts]),
-        R_world_body=np.concatenate([p.R_world_body for p in parts]),
-        states=np.concatenate([p.states for p in parts]),
-    )
 
 
 @dataclass(frozen=True)

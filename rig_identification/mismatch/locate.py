@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.growing import misfit, settled_starts
-from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, excess, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, excess, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 
 #: What drives the motion: a device that measures a force, which without it may be any.
@@ -124,93 +123,3 @@ def find_liar(problem: Problem, evaluation: Evaluation, budget: Budget = UNLIMIT
             if left < AGREED and (best is None or left < best.left):
                 best = Liar(device, fitted.point, left)
     return best
-
-
-@dataclass(frozen=True)
-class Event:
-    """A stretch of one recording in which something acts that the rest of it does not show."""
-
-    recording: str
-    start: float  # s after the recording's start
-    end: float  # s
-    point: Point  # fitted without it, for all pieces
-    calm: tuple[int, ...]  # pieces that it leaves in peace
-
-
-#: An event may take up this share of the pieces. It shows in them by so many standard deviations of a mean
-#: square beyond noise; beside something else, by so many times what that leaves.
-EVENT_SHARE = 0.4
-EVENT_SEEN = 6.0
-EVENT_CONTRAST = 3.0
-#: Mean square of the calm pieces' residuals up to which they count as explained.
-CALM = 1.15
-
-
-@dataclass(frozen=True)
-class Calm:
-    """The pieces that fit best, fitted without the others."""
-
-    keep: tuple[int, ...]
-    fitted: Evaluation
-
-
-def calm_pieces(problem: Problem, evaluation: Evaluation) -> Calm | None:
-    """Those of a problem's pieces that an event would leave in peace; None where there are too few."""
-    count = len(problem.runs)
-    if count < 4:
-        return None
-    order = np.argsort([float(np.mean(run.residual**2)) for run in evaluation.runs])
-    keep = sorted(int(i) for i in order[: count - int(EVENT_SHARE * count)])
-    part = replace(problem, runs=tuple(problem.runs[i] for i in keep))
-    point = replace(evaluation.point, starts=tuple(evaluation.point.starts[i] for i in keep), latents=())
-    # Steps that win next to nothing of what is left do not bring these pieces to noise either
-    fitted, _ = solve(part, point, iterations=10, tolerance=0.5, polish=POLISH)
-    return Calm(tuple(keep), fitted)
-
-
-def find_event(
-    problem: Problem, evaluation: Evaluation, alone: bool = True, calm: Calm | None = None
-) -> Event | None:
-    """Pieces that cannot be fitted, next to each other in one run; None where there are no such.
-
-    alone: all other pieces are explained. Otherwise something else is wrong in these, alike in all of
-    them, before the event and after it. calm: the :func:`calm_pieces`, where they are known.
-    """
-    calm = calm or calm_pieces(problem, evaluation)
-    if calm is None or (alone and misfit(calm.fitted) > CALM):
-        return None
-    count, keep, fitted = len(problem.runs), list(calm.keep), calm.fitted
-    starts = list(evaluation.point.starts)
-    for i, start in zip(keep, fitted.point.starts, strict=True):
-        starts[i] = start
-    point = replace(fitted.point, starts=tuple(starts), latents=())
-    # Pieces that were not fitted start as suits the calm ones' body
-    point = replace(point, starts=settled_starts(problem, point))
-    whole = evaluate(problem, point)
-    if whole is None:
-        return None
-    squares = np.array([float(np.mean(run.residual**2)) for run in whole.runs])
-    if alone:
-        sizes = np.array([run.residual.size for run in whole.runs])
-        limit = np.mean(squares[keep]) + EVENT_SEEN * np.sqrt(2.0 / sizes)
-    else:
-        limit = np.full(count, EVENT_CONTRAST * max(CALM, float(np.max(squares[keep]))))
-    bad = [i for i in range(count) if squares[i] > limit[i]]
-    names = {problem.runs[i].recording.name for i in bad}
-    if not bad or len(names) > 1 or bad != list(range(bad[0], bad[-1] + 1)):
-        return None
-    event = event_in(problem, bad, point)
-    return None if not alone and at_an_end(event, problem) else event
-
-
-def event_in(problem: Problem, bad: list[int], point: Point) -> Event:
-    """The event that takes the pieces ``bad`` of one recording, next to each other."""
-    first, last = problem.runs[bad[0]], problem.runs[bad[-1]]
-    calm = tuple(i for i in range(len(problem.runs)) if i not in bad)
-    return Event(first.recording.name, first.offset, last.offset + last.grid.duration, point, calm)
-
-
-def at_an_end(event: Event, problem: Problem) -> bool:
-    """Whether an event takes a recording's first or last piece: what dies away, or grows, does so too."""
-    within = [i for i, run in enumerate(problem.runs) if run.recording.name == event.recording]
-    return within[0] not in event.calm or within[-1] not in event.calm

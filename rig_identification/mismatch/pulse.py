@@ -25,7 +25,6 @@ from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import pushed
-from rig_identification.mismatch.locate import EVENT_SHARE
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.screen import free_without, with_reference
@@ -39,6 +38,8 @@ Array = NDArray[np.float64]
 DURATIONS, APART, AT_ONCE = (0.5, 1.5), 0.3, 16
 #: Prior std of a push, as a share of the body's weight: a hand's, a gust's.
 LIKELY = 0.05
+#: A push may take up this share of a run.
+EVENT_SHARE = 0.4
 #: Steps of the simplex that finds start and duration, and the sides of its first triangle: in durations,
 #: and in the log of the duration.
 STEPS, NUDGE = 60, (0.25, 0.2)

@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.estimates import estimates
-from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.growing import (
     NEAR_SQUARE,
-    fit_start_growing,
     held_over,
     misfit,
     settled_starts,
 )
-from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import Linearised, model_at
-from rig_identification.estimate.solve import HOPELESS, POLISH, Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.model.definite import definite
-from rig_identification.model.equilibrium import find_rest
-from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 #: Whether a fit is to end after the step that it is at.
@@ -84,20 +77,6 @@ def mass_of(problem: Problem, evaluation: Evaluation) -> float:
     return float(problem.bench.parameters.elements(evaluation.point.theta)[0])
 
 
-def at_minimum(problem: Problem, evaluation: Evaluation) -> Evaluation:
-    """Where a fit stands that takes the recordings as they are; where there is none, ``evaluation``.
-
-    Where the search begins channels were weighed by their residuals (cautious.py). First order is about a
-    minimum, and where bending the rig alone promises all that is left everything else promises nothing. Where
-    very much is left such a fit bends the rig by more than first order reaches.
-    """
-    try:
-        fitted, _ = solve(problem, evaluation.point, iterations=FIRST_STEPS, tolerance=0.5, polish=POLISH)
-    except FloatingPointError:
-        return evaluation
-    return fitted if fitted.cost < evaluation.cost else evaluation
-
-
 def log_evidence(evaluation: Evaluation) -> float:
     """Laplace: log posterior at its peak, less half the log of how much sharper it is than the prior.
 
@@ -106,77 +85,6 @@ def log_evidence(evaluation: Evaluation) -> float:
     """
     _, log_det = np.linalg.slogdet(definite(evaluation.information))
     return -evaluation.cost - 0.5 * float(log_det)
-
-
-def earned_evidence(problem: Problem, before: Evaluation, after: Evaluation, *, far: bool) -> float:
-    """Log evidence of ``after``; near the noise, less what it only gains from that over ``before``.
-
-    problem: of ``before``, with the same runs. far: whether much was left.
-    """
-    return log_evidence(after) - (0.0 if far else unearned(problem, before, after.runs))
-
-
-def adopted(
-    problem: Problem,
-    evaluation: Evaluation,
-    trial: Trial,
-    *,
-    in_passing: bool = False,
-    budget: Budget = UNLIMITED,
-) -> tuple[Problem, Evaluation]:
-    """A trial's effect in the model of all pieces, fitted.
-
-    in_passing: what it leads to is known and comes next; nothing is fitted without that. Where it is late the
-    fit stays where it is.
-    """
-    wide = extended(problem, (trial.candidate,))
-    if len(wide.runs) == len(trial.problem.runs):
-        return trial.problem, trial.evaluation
-    theta = trial.evaluation.point.theta
-    point = carried(wide, problem, evaluation.point)
-    if trial.candidate.settle is not None:
-        point = trial.candidate.settle(wide, replace(point, theta=theta), evaluation)
-    known = {
-        run.begins: start
-        for run, start in zip(trial.problem.runs, trial.evaluation.point.starts, strict=True)
-    }
-    point = replace(point, theta=theta)
-    if in_passing:
-        starts = tuple(
-            known.get(run.begins) or start for run, start in zip(wide.runs, point.starts, strict=True)
-        )
-        there = evaluate(wide, replace(point, starts=starts))
-        if there is not None:
-            return wide, there
-    starts = tuple(
-        known.get(run.begins) or _begun(wide, run, point, start)
-        for run, start in zip(wide.runs, point.starts, strict=True)
-    )
-    point = replace(point, starts=starts)
-    there = evaluate(wide, point)
-    if there is not None and misfit(there) < AGREED:
-        # Pieces that it was not fitted to agree: whole runs are next, and fitting these all tells no more
-        return wide, there
-    fitted, _ = solve(wide, point, iterations=6, tolerance=0.5, stop=budget.late)
-    return wide, fitted
-
-
-def _begun(problem: Problem, run: Run, point: Point, start: State) -> State:
-    """Where a piece starts that a trial has not seen: with what it adopts that may be far from before."""
-    found = fit_start_growing(problem.bench, run, point.theta, start)
-    if found is not None and float(np.mean(found[0].residual ** 2)) < HOPELESS:
-        return found[1]
-    guess = (*point.rest_guesses, start)[0]
-    rest = find_rest(model_at(problem.bench.parameters, point.theta), guess).state
-    launched = launch_state(problem.bench, run, point.theta, rest)
-    again = fit_start_growing(problem.bench, run, point.theta, launched)
-    found = min((f for f in (found, again) if f is not None), key=_left, default=None)
-    return start if found is None else found[1]
-
-
-def _left(found: tuple[Linearised, State]) -> float:
-    """Squared residuals that a start state leaves."""
-    return float(found[0].residual @ found[0].residual)
 
 
 def attempt(
@@ -212,26 +120,6 @@ def attempt(
         return None
     trial = Trial(candidate, wide, fitted, log_evidence(fitted), settled and misfit(fitted) < NEAR_SQUARE)
     return None if _beyond_its_amount(trial) else trial
-
-
-def fitted_from(
-    candidate: Candidate, problem: Problem, starts: Sequence[Evaluation], budget: Budget = UNLIMITED
-) -> Trial | None:
-    """A trial of a hypothesis that is in the problem, from that of ``starts`` that leads furthest."""
-    best: Trial | None = None
-    for start in starts:
-        if best is not None and budget.spent():
-            break
-        try:
-            fitted, settled = _first_steps(problem, start.point, LAST_STEPS, budget.spent)
-        except FloatingPointError:
-            continue
-        settled = settled and misfit(fitted) < NEAR_SQUARE
-        if best is None or fitted.cost < best.evaluation.cost:
-            best = Trial(candidate, problem, fitted, log_evidence(fitted), settled)
-        if settled:
-            break
-    return best
 
 
 def _placed(begun: Point, promised: Point, problem: Problem, candidate: Candidate) -> Point:
@@ -380,11 +268,6 @@ def fitted_to_its_end(
     return None if begun is None else finished(begun, budget)
 
 
-def as_it_stands(trial: Trial) -> Trial | None:
-    """The trial where its first steps led; None where its sign makes no sense."""
-    return trial if _sensible(trial) else None
-
-
 def _closest(trial: Trial, stop: Stop) -> Trial:
     """The likeliest closer description of a trial's effect; the trial where none is likelier."""
     if trial.candidate.closer is None:
@@ -474,14 +357,6 @@ def signs(trial: Trial) -> list[float]:
         return []
     seen = in_stds(trial)
     return [seen[p.name] for p in positive]
-
-
-def amount_seen(trial: Trial) -> bool:
-    """Whether any amount lies clear of none, as a hose's pull at rest may; what has no amount does."""
-    candidate = trial.candidate
-    amounts = candidate.parameters[candidate.positive :][: candidate.either_way]
-    seen = in_stds(trial) if amounts else {}
-    return max([*signs(trial), *(abs(seen[p.name]) for p in amounts)], default=PLAIN) >= PLAIN
 
 
 def may_be_none(trial: Trial) -> bool:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import ORDINARY, Ideal, judged
+from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.solve import Point, Problem
 from rig_identification.estimate.verdict import hear, weighed_otherwise
 from rig_identification.estimate.whole import fit_whole
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
-from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import (
     Trial,
     beyond_doubt,
@@ -32,15 +33,35 @@ from rig_identification.result import Finding, Mismatch
 FIRM = 10.0
 
 
-def whole_runs(ideal: Ideal, search: Search, *, as_found: bool = False) -> Explained:
+#: Who is told what explains whole runs, as it is found.
+Heard = Callable[[Explained], None]
+
+
+def unheard(found: Explained) -> None:
+    """Nobody waits for what is found on the way."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Effects that are in a model, fitted to whole runs, and what is told beside them."""
+
+    problem: Problem  # the ideal model's
+    found: tuple[Trial, ...]  # the last one's fit has all of them
+    budget: Budget
+    rivals: tuple[dict[str, object], ...] = ()
+    bodies: Bodies = ()  # what rivals of the last one make of the body
+    heard: Heard = unheard  # is told what explains whole runs, as it is found
+
+
+def whole_runs(ideal: Ideal, named: Named, *, as_found: bool = False) -> Explained:
     """Whole runs with what was found. as_found: it is told in that order, whatever says most."""
-    known = search.evaluation.point
-    return fitted_whole(ideal, search, search.found, search.here, known, as_found=as_found)
+    known = named.found[-1].evaluation.point
+    return fitted_whole(ideal, named, list(named.found), named.found[-1].problem, known, as_found=as_found)
 
 
 def fitted_whole(
     ideal: Ideal,
-    search: Search,
+    named: Named,
     found: list[Trial],
     here: Problem,
     known: Point,
@@ -48,17 +69,17 @@ def fitted_whole(
     as_found: bool = False,
 ) -> Explained:
     """Whole runs with the effects ``found``, from a ``known`` point of the problem ``here``."""
-    whole = extended(search.problem, tuple(t.candidate for t in found))
+    whole = extended(named.problem, tuple(t.candidate for t in found))
     point = replace(known, theta=carried(whole, here, known).theta)
     curved = any(t.candidate.curved for t in found)
-    fitted = fit_whole(ideal.fitted, whole, here, point, search.budget.late, curved)
+    fitted = fit_whole(ideal.fitted, whole, here, point, named.budget.late, curved)
     after, verdict = judged(fitted)
-    if verdict.verdict != "none" and not curved and not search.budget.spent() and strayed(fitted):
-        fitted = _along_what_happened(ideal.fitted, fitted, search.budget.late)
+    if verdict.verdict != "none" and not curved and not named.budget.spent() and strayed(fitted):
+        fitted = _along_what_happened(ideal.fitted, fitted, named.budget.late)
         after, verdict = judged(fitted)
     if not as_found:
         # What says most comes first, whatever was found first. Without its effect an error goes to its bound
-        bounds = {name: ORDINARY * std for name, std in ordinary_errors(search.problem).items()}
+        bounds = {name: ORDINARY * std for name, std in ordinary_errors(named.problem).items()}
         found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
     # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
     # a held-out run that cannot be followed, of which there is no residual to hear
@@ -67,28 +88,28 @@ def fitted_whole(
     trace = heard is not None and not heard.contradicted
     loose = heard.looseness if heard is not None and trace else 1.0
     findings = _findings(ideal, fitted, found, after.holdout, loose)
-    named = effects_of(findings)
+    effects = effects_of(findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
     can_be = all(possible(as_fitted(fitted, t)) for t in found)
     if not can_be:
         told, trace = "unexplained", False
         text = (
-            f"{named} would have less than nothing of an amount, or act where no body in this rig can be: it "
-            f"stands for something else. {errors}"
+            f"{effects} would have less than nothing of an amount, or act where no body in this rig can be: "
+            f"it stands for something else. {errors}"
         )
     elif verdict.verdict == "none":
-        told, text = "explained", f"With {named} in the model every residual is noise. {errors}"
+        told, text = "explained", f"With {effects} in the model every residual is noise. {errors}"
     elif trace:
-        told, text = "explained", f"{named} explains all but a trace. {errors} {verdict.explanation}"
+        told, text = "explained", f"{effects} explains all but a trace. {errors} {verdict.explanation}"
     else:
         told = "unexplained"
-        text = f"{named} explains part of it; something is left. {verdict.explanation}"
-    mismatch = Mismatch(told, text, findings, tuple(search.rivals))
+        text = f"{effects} explains part of it; something is left. {verdict.explanation}"
+    mismatch = Mismatch(told, text, findings, named.rivals)
     outcome = Explained(
-        fitted, mismatch, ideal, loose, trace, search.bodies, can_be, tuple(found), search.problem
+        fitted, mismatch, ideal, loose, trace, named.bodies, can_be, tuple(found), named.problem
     )
     if outcome.told:
-        search.heard(outcome)
+        named.heard(outcome)
     return outcome
 
 
@@ -129,13 +150,13 @@ def firmness(trial: Trial, ordinary: dict[str, float], count: int) -> float:
     return strength(trial) / needed_gain(trial.candidate, count)
 
 
-def pruned(best: Explained, search: Search, count: int) -> Explained:
+def pruned(best: Explained, named: Named, count: int) -> Explained:
     """The explanation less what it can do without: an early effect may only have stood in for a later one.
 
     What may as well be none goes first, and goes too where a trace is left without it.
     """
-    kept = list(search.found)
-    ordinary = ordinary_errors(search.problem)
+    kept = list(named.found)
+    ordinary = ordinary_errors(named.problem)
     while len(kept) > 1:
         fitted = best.fitted
         here = [as_fitted(fitted, t) for t in kept]
@@ -145,7 +166,7 @@ def pruned(best: Explained, search: Search, count: int) -> Explained:
             if strengths[i] > FIRM:
                 return best
             less = [t for k, t in enumerate(kept) if k != i]
-            again = fitted_whole(best.ideal, search, less, fitted.problem, fitted.evaluation.point)
+            again = fitted_whole(best.ideal, named, less, fitted.problem, fitted.evaluation.point)
             if again.told and (none[i] or best.trace or not again.trace):
                 # What leaves a trace that both together do not leave lacks something
                 best, kept = again, less

@@ -18,7 +18,6 @@ from rig_identification.mismatch.hypotheses import compatible, count_of, net_gai
 from rig_identification.mismatch.late import lag_like
 from rig_identification.mismatch.same_clock import contradicted
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
-from rig_identification.mismatch.simpler import special_cases
 from rig_identification.mismatch.trial import (
     Trial,
     attempt,
@@ -162,10 +161,17 @@ def _alike(
     return [child for child in alike if child is not None]
 
 
-def _makes_sense(standing: Standing, ordinary: dict[str, float]) -> bool:
-    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary.
+def special_cases(candidate: Candidate, others: list[Candidate]) -> list[Candidate]:
+    """Those of ``others`` whose numbers are some, and not all, of a candidate's.
 
+    A bias beside a cross-sensitivity with its own bias promises no more than that, and may be all there is.
     """
+    own = {p.name for p in candidate.parameters}
+    return [c for c in others if c.build is None and {p.name for p in c.parameters} < own]
+
+
+def _makes_sense(standing: Standing, ordinary: dict[str, float]) -> bool:
+    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary."""
     trial = _last_of(standing)
     return possible(trial) and beyond_doubt(trial, ordinary, ORDINARY)
 

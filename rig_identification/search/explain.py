@@ -9,13 +9,14 @@ import numpy as np
 from rig_identification.estimate.identify import Ideal, only_watched
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.hypotheses import catalogue, count_of, worth_a_fit
+from rig_identification.mismatch.hypotheses import catalogue, count_of
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
-from rig_identification.mismatch.standing import Heard, unheard
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided
+from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.events import event_beside, event_of, explained_outside, standing_out
+from rig_identification.search.expand import worthy
 from rig_identification.search.ladder import Rung
 from rig_identification.search.levels import ALONE
 from rig_identification.search.search import Outcome, first_rung, problem_of, search
@@ -62,7 +63,7 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     candidates = catalogue(problem)
     promises = screen(problem, evaluation, candidates, mass_of(problem, evaluation))
     count = count_of(candidates)
-    if worth_a_fit(promises, count):
+    if worthy(promises, count):
         found = search(ideal, Rung(problem, evaluation, ALONE), notify, budget, promises=promises).told
         if found is not None and found.wholly:
             return found

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.solve import POLISH, Problem, solve
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.lawful import made_sparse
-from rig_identification.mismatch.point_laws import law_finding, parts_of, point_laws
-from rig_identification.mismatch.screen import Promise, extended
-from rig_identification.mismatch.trial import Trial, mass_of
+from rig_identification.mismatch.point_laws import law_finding, parts_of, point_laws, sparser
+from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.trial import LAST_STEPS, Trial, in_stds, log_evidence, mass_of
 from rig_identification.search.ladder import Rung
 
 
@@ -32,7 +31,7 @@ def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
     if law is None:
         return found
     others = tuple(t.candidate for t in found if t is not law)
-    less = made_sparse(extended(problem, others), law, budget)
+    less = _made_sparse(extended(problem, others), law, budget)
     return [replace(less if t is law else t, problem=less.problem, evaluation=less.evaluation) for t in found]
 
 
@@ -53,3 +52,20 @@ def in_words(best: Explained, found: list[Trial]) -> Explained:
 def _law_of(found: list[Trial]) -> Trial | None:
     """The one that is a law; None where none is."""
     return next((t for t in found if parts_of(t.candidate)), None)
+
+
+def _made_sparse(problem: Problem, trial: Trial, budget: Budget) -> Trial:
+    """The trial less the parts of its law that are not seen, one after the other."""
+    while True:
+        less: Candidate | None = sparser(trial.candidate, in_stds(trial))
+        if less is None:
+            return trial
+        wide = extended(problem, (less,))
+        try:
+            start = carried(wide, trial.problem, trial.evaluation.point)
+            fitted, settled = solve(
+                wide, start, iterations=LAST_STEPS, tolerance=0.1, polish=POLISH, stop=budget.spent
+            )
+        except FloatingPointError:
+            return trial
+        trial = Trial(less, wide, fitted, log_evidence(fitted), settled)

@@ -18,7 +18,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of
 from rig_identification.mismatch.screen import Promise, with_reference
-from rig_identification.mismatch.standing import Heard, unheard
+from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.expand import Standing, children
 from rig_identification.search.ladder import Rung, begun, climbed
 from rig_identification.search.levels import ALONE

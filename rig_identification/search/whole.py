@@ -7,25 +7,30 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.solve import Problem, excess
+from rig_identification.estimate.observability import inertial_estimate
+from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.hypotheses import compatible, count_of, worth_a_fit
-from rig_identification.mismatch.outcome import Trials
+from rig_identification.mismatch.findings import rival
+from rig_identification.mismatch.hypotheses import compatible, count_of
+from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.screen import screen
-from rig_identification.mismatch.standing import Heard, Search, unheard
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.trial import Trial, mass_of
 from rig_identification.mismatch.undecided import undecided_beside
-from rig_identification.mismatch.whole_rivals import likeliest_whole
-from rig_identification.mismatch.whole_runs import pruned, whole_runs
-from rig_identification.search.expand import Say, Standing, children
+from rig_identification.mismatch.whole_runs import Heard, Named, as_fitted, pruned, unheard, whole_runs
+from rig_identification.search.expand import Say, Standing, children, worthy
 from rig_identification.search.ladder import Rung
 from rig_identification.search.laws import in_words, sparse
 from rig_identification.search.levels import ALONE
 
 #: Effects that are told of a session at most.
 MOST_EFFECTS = 3
+#: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
+MEANT = 3.0
+#: Log evidence by which a hypothesis may trail that held-out runs are still asked about.
+CLOSE = 30.0
 
 
 def in_whole_runs(
@@ -44,31 +49,19 @@ def in_whole_runs(
     trail it the one that the held-out runs say most for is told.
     """
     found = sparse(problem, [standing.trial(c) for c in standing.found], budget)
-    last, earlier = found[-1], found[:-1]
-    before = Search(
-        problem,
-        last.problem,
-        last.evaluation,
-        excess(ideal.fitted.evaluation),
-        budget,
-        found=list(earlier),
-        heard=heard,
-    )
     alike = [o.trial(o.found[-1]) for o in others if _comparable(o, standing)]
-    tried = Trials([last, *alike])
-    search = before.forked()
-    search.adopt(tried, last)
+    ranked = told_apart([found[-1], *alike], MEANT)
+    earlier = tuple(found[:-1])
     say("whole runs with " + standing.label)
     try:
-        best = whole_runs(ideal, search)
+        named = _beside_rivals(Named(problem, (*earlier, ranked[0]), budget, heard=heard), ranked[1:])
+        best = whole_runs(ideal, named)
         if best.wholly:
-            best, search = likeliest_whole(
-                ideal, before, tried, best, search, lambda label: say(f"whole runs with {label}")
-            )
-            best = _alone_or_with_one_more(ideal, problem, best, search, candidates, say)
+            named, best = _likeliest(ideal, named, best, ranked, say)
+            best = _alone_or_with_one_more(ideal, problem, best, named, candidates, say)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
-    return in_words(best, search.found)
+    return in_words(best, list(named.found))
 
 
 def _comparable(other: Standing, standing: Standing) -> bool:
@@ -77,26 +70,78 @@ def _comparable(other: Standing, standing: Standing) -> bool:
     return same and other.rung.level >= standing.rung.level and other.found[-1] != standing.found[-1]
 
 
+def _beside_rivals(named: Named, others: list[Trial]) -> Named:
+    """The same with other last effects stated as rivals."""
+    last = named.found[-1]
+    gaps = [(max(0.0, last.evidence - t.evidence), t) for t in others]
+    return replace(
+        named,
+        rivals=tuple(rival(t, gap) for gap, t in gaps),
+        bodies=tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in gaps),
+    )
+
+
+def _likeliest(
+    ideal: Ideal, named: Named, best: Explained, ranked: list[Trial], say: Say
+) -> tuple[Named, Explained]:
+    """What all runs say most for, held-out ones among them, of last effects ``ranked`` by the fitted ones.
+
+    best: whole runs with the first of them, which leave only noise. One with more numbers of its own bends
+    to what is left, and is not asked.
+    """
+    first, earlier = ranked[0], named.found[:-1]
+    heard = [(first, named, best)]
+    for trial in ranked[1:]:
+        plain = len(trial.candidate.parameters) <= len(first.candidate.parameters)
+        if named.budget.spent() or first.evidence - trial.evidence > CLOSE or not plain:
+            continue
+        its = replace(named, found=(*earlier, trial))
+        say("whole runs with " + trial.candidate.label)
+        heard.append((trial, its, whole_runs(ideal, its)))
+    if len(heard) == 1:
+        return named, best
+    held = [held_out_densities(found.fitted) for _, _, found in heard]
+    # A run that one of them cannot follow tells nothing of the others
+    followed = set.intersection(*(set(densities) for densities in held))
+    said = [
+        t.evidence + sum(densities[key] for key in followed)
+        for (t, _, _), densities in zip(heard, held, strict=True)
+    ]
+    chosen = max((k for k, h in enumerate(heard) if h[2].wholly), key=lambda k: said[k])
+    last, its, found = heard[chosen]
+    fitted = {
+        id(t): replace(as_fitted(explained.fitted, t), evidence=all_runs)
+        for (t, _, explained), all_runs in zip(heard, said, strict=True)
+    }
+    trailing = [fitted[id(t)] for t in ranked if id(t) in fitted and t is not last]
+    # Of those that were not asked what the fitted runs say stays
+    behind = said[chosen] - last.evidence
+    trailing += [replace(t, evidence=t.evidence + behind) for t in ranked if id(t) not in fitted]
+    its = _beside_rivals(replace(its, found=(*earlier, replace(last, evidence=said[chosen]))), trailing)
+    told = replace(found.mismatch, alternatives=its.rivals)
+    return its, replace(found, mismatch=told, bodies=its.bodies)
+
+
 def _alone_or_with_one_more(
-    ideal: Ideal, problem: Problem, best: Explained, search: Search, candidates: list[Candidate], say: Say
+    ideal: Ideal, problem: Problem, best: Explained, named: Named, candidates: list[Candidate], say: Say
 ) -> Explained:
     """What explains all, without what it can do without, or with what shows beside it within the noise."""
-    kept = pruned(best, search, len(candidates))
-    if kept is not best or len(search.found) == MOST_EFFECTS or search.budget.spent():
+    kept = pruned(best, named, len(candidates))
+    if kept is not best or len(named.found) == MOST_EFFECTS or named.budget.spent():
         return kept
-    found = tuple(t.candidate for t in search.found)
+    found = tuple(t.candidate for t in named.found)
     here, evaluation = best.fitted.problem, best.fitted.evaluation
     left = compatible(candidates, list(found))
     say("anything more within the noise")
     promises = screen(here, evaluation, left, mass_of(here, evaluation))
-    if worth_a_fit(promises, count_of(left)):
+    if worthy(promises, count_of(left)):
         # What all residuals are noise with comes before what is found within that noise, and bends to it
         now = Standing(Rung(here, evaluation, ALONE), found)
-        for child in children(problem, now, candidates, search.budget, say, promises)[:1]:
-            more = replace(search.forked(), here=child.rung.problem, evaluation=child.rung.evaluation)
-            more.found.append(child.trial(child.found[-1]))
+        for child in children(problem, now, candidates, named.budget, say, promises)[:1]:
             say("whole runs with " + child.label)
-            both = whole_runs(ideal, more, as_found=True)
+            both = whole_runs(
+                ideal, replace(named, found=(*named.found, child.trial(child.found[-1]))), as_found=True
+            )
             if both.wholly:
                 return both
-    return undecided_beside(best, promises, count_of(left), lambda stage, _: say(stage), search.budget)
+    return undecided_beside(best, promises, count_of(left), lambda stage, _: say(stage), named.budget)
