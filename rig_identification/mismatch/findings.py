@@ -12,7 +12,6 @@ from rig_identification.estimate.estimates import Estimates, estimates
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Told
 from rig_identification.mismatch.experiments import experiment_for
-from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.trial import Trial
 from rig_identification.quantity import plain_figure, with_interval
 from rig_identification.result import Finding, Mismatch
@@ -95,21 +94,6 @@ def rival(trial: Trial, gap: float) -> dict[str, object]:
         "log_likelihood_gap": float(gap),
         "parameters": written(trial.candidate.told(estimates(trial.problem, trial.evaluation))),
         "experiment": experiment_for(trial.candidate.kind),
-    }
-
-
-def not_fitted(promise: Promise) -> dict[str, object]:
-    """An entry of ``alternatives``: what promised much, and the work was done before it could be fitted.
-
-    Its gap is what first order says that it would leave, and never a tie.
-    """
-    left = promise.gain * (1.0 / promise.share - 1.0) if promise.share > 0.0 else 0.0
-    return {
-        "effect": promise.candidate.effect,
-        "where": dict(promise.candidate.where),
-        "log_likelihood_gap": max(float(left), NO_TIE),
-        "fitted": False,
-        "experiment": experiment_for(promise.candidate.kind),
     }
 
 

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 SHARE = 0.02
 #: Interval (s) over which it is averaged: shorter courses are noise.
 AVERAGED = 0.1
-#: Std (m and rad; m/s and rad/s) of a start state that was fitted.
-LAUNCHED = (0.002, 0.01)
 
 
 @dataclass(frozen=True)

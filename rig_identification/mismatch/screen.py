@@ -147,31 +147,6 @@ def _opened(
     return wide, Beyond(full, base, wide.bench.parameters.size), Boxed(wide, full, added, probed, asked)
 
 
-def promises_of(problem: Problem, evaluation: Evaluation, candidates: list[Candidate]) -> list[Promise]:
-    """Promises of ``candidates`` alone, which change numbers and not the model, in their order."""
-    opened = _opened(problem, evaluation, candidates)
-    return [] if opened is None else [_promise(*opened, c) for c in candidates]
-
-
-def together(
-    problem: Problem, evaluation: Evaluation, pairs: list[tuple[Candidate, Candidate]]
-) -> list[float]:
-    """What pairs of candidates that change numbers and not the model promise together, nats, in order."""
-    opened = _opened(problem, evaluation, list({c.label: c for pair in pairs for c in pair}.values()))
-    return [] if opened is None else [_promise(*opened, _both(*pair)).gain for pair in pairs]
-
-
-def _both(one: Candidate, other: Candidate) -> Candidate:
-    """Two candidates as one, what cannot be negative of either first."""
-    numbers = (
-        one.parameters[: one.positive],
-        other.parameters[: other.positive],
-        one.parameters[one.positive :],
-        other.parameters[other.positive :],
-    )
-    return replace(one, parameters=sum(numbers, ()), positive=one.positive + other.positive)
-
-
 def free_without(
     wide: Problem, point: Point, full: Evaluation, added: set[str], probed: int
 ) -> NDArray[np.int64]:

@@ -30,8 +30,6 @@ Stop = Callable[[], bool]
 
 #: Std by which one of several numbers may lie on the wrong side of zero by chance.
 ABSURD = 3.0
-#: Std by which an amount has to lie clear of none.
-PLAIN = 3.0
 #: Half-width of a normal distribution's 95 % interval, in std.
 NORMAL_95 = 1.96
 #: Steps of a first, short fit (more where the model itself changes) and of one to the end.
@@ -339,15 +337,6 @@ def _described(trial: Trial, candidate: Candidate, values: dict[str, float], sto
     except FloatingPointError:
         return None
     return Trial(candidate, wide, fitted, log_evidence(fitted), True)
-
-
-def among_places(trial: Trial) -> Trial:
-    """The trial as likely as its effect is at that place, of all places at which it could be.
-
-    Beforehand every effect is as likely as another one, wherever it is: one upper hinge of three that is off
-    along z is alike to a ceiling that is off level, and is one of eighteen where that is one of two.
-    """
-    return replace(trial, evidence=trial.evidence - float(np.log(trial.candidate.places)))
 
 
 def signs(trial: Trial) -> list[float]:

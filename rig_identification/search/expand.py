@@ -15,6 +15,7 @@ from rig_identification.estimate.solve import Point, Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, net_gain
+from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like
 from rig_identification.mismatch.same_clock import contradicted
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
@@ -53,11 +54,12 @@ class Standing:
 
     rung: Rung
     found: tuple[Candidate, ...] = ()
+    unearned: float = 0.0  # nats that it gains from the noise of the exciter's force alone (in_motion.py)
 
     @property
     def evidence(self) -> float:
         """Log marginal likelihood less a constant, each effect as likely beforehand wherever it is."""
-        return self.rung.evidence - float(sum(np.log(c.places) for c in self.found))
+        return self.rung.evidence - self.unearned - float(sum(np.log(c.places) for c in self.found))
 
     @property
     def label(self) -> str:
@@ -109,7 +111,16 @@ def children(
             walked.append(replace(child, rung=down))
             walked += _closer(problem, walked[-1], say)
     ordinary = ordinary_errors(problem)
-    return sorted((s for s in walked if _makes_sense(s, ordinary)), key=lambda s: -s.evidence)
+    sensible = (_earned(standing, s) for s in walked if _makes_sense(s, ordinary))
+    return sorted(sensible, key=lambda s: -s.evidence)
+
+
+def _earned(before: Standing, after: Standing) -> Standing:
+    """A model beside the one ``before``: where neither needs a wrench, what it gains from noise is none."""
+    if not (before.rung.alone and after.rung.alone):
+        return after
+    runs = after.rung.evaluation.runs
+    return replace(after, unearned=unearned(before.rung.problem, before.rung.evaluation, runs))
 
 
 def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say: Say) -> list[Standing]:
