@@ -29,6 +29,8 @@ from rig_identification.search.path import beside, followed, found_from
 
 #: Gain (nats) that a step has to promise: less does not tell models apart.
 WORTH = 2.0
+#: Level at which a first guess begins: an order of magnitude from what most recordings ask for.
+MIDDLE = 3
 #: Steps at each level on the way down, and where the way ends.
 PASSING, STAYING = 2, 6
 #: Parts of a step that are tried where all of it does not pay.
@@ -72,18 +74,23 @@ class Rung:
 
 def begun(problem: Problem, point: Point) -> Rung | None:
     """A model at its own level, from a first guess; None where not even the strongest wrench follows."""
-    found = found_from(_at(problem, point, 0), point)
-    return None if found is None else walked_down(problem, found, 0)
+    for level in (MIDDLE, 0):
+        found = found_from(_at(problem, point, level), point)
+        rung = None if found is None else walked_down(problem, found, level)
+        if rung is not None and misfit(rung.evaluation) < LOST:
+            return rung if rung.level > level else climbed(rung)
+    return None
 
 
-def climbed(problem: Problem, evaluation: Evaluation) -> Rung:
-    """A model near the noise at its own level, from where it stands alone. evaluation: of the problem."""
-    best = Rung(problem, evaluation, ALONE)
-    for level in reversed(range(ALONE)):
-        rung = fitted_at(problem, replace(best.evaluation.point, latents=()), level, PASSING)
-        if rung is None or rung.evidence < best.evidence:
+def climbed(rung: Rung) -> Rung:
+    """A model at the level that the evidence asks for, of its own and stronger ones."""
+    best = rung
+    for level in reversed(range(rung.level)):
+        point = best.evaluation.point
+        stronger = fitted_at(best.model, replace(point, latents=()), level, PASSING)
+        if stronger is None or stronger.evidence < best.evidence:
             break
-        best = rung
+        best = stronger
     return best
 
 
@@ -92,16 +99,38 @@ def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
 
     point: with the wrenches of that level.
     """
-    best: Rung | None = None
-    while level <= ALONE:
-        rung = fitted_at(problem, point, level, PASSING)
-        if rung is not None and best is not None and rung.evidence < best.evidence:
+    best = fitted_at(problem, point, level, PASSING)
+    if best is None:
+        return None
+    alone = _alone_at_once(best)
+    if alone is not None:
+        return climbed(alone)
+    while best.level < ALONE:
+        weaker = fitted_at(problem, best.evaluation.point, best.level + 1, PASSING)
+        if weaker is not None and weaker.evidence < best.evidence:
             # Only where a fit to its end says so is a weaker wrench less likely
-            rung = fitted_at(problem, rung.evaluation.point, level, STAYING)
-        if rung is None or (best is not None and rung.evidence < best.evidence):
+            weaker = fitted_at(problem, weaker.evaluation.point, weaker.level, STAYING)
+        if weaker is None or weaker.evidence < best.evidence:
             break
-        best, point, level = rung, rung.evaluation.point, level + 1
+        best = weaker
     return best
+
+
+def _alone_at_once(rung: Rung) -> Rung | None:
+    """The model without a wrench, where its motion is not lost and it is likelier; None where it is not."""
+    if rung.level >= ALONE - 1:
+        return None
+    point = replace(rung.evaluation.point, latents=())
+    try:
+        there = evaluate(rung.model, point, residuals_only=True)
+        if there is None or misfit(there) > LOST:
+            return None
+        near, _ = solve(rung.model, point, iterations=STAYING, tolerance=0.05)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    if log_evidence(near) < rung.evidence:
+        return None
+    return fitted_at(rung.model, near.point, ALONE, STAYING)
 
 
 def fitted_at(problem: Problem, point: Point, level: int, steps: int) -> Rung | None:

@@ -54,7 +54,7 @@ def first_rung(ideal: Ideal) -> Rung | None:
     if only_watched(fitted.problem):
         return Rung(problem, fitted.evaluation, ALONE)
     if misfit(fitted.evaluation) < NEAR_SQUARE:
-        return climbed(problem, fitted.evaluation)
+        return climbed(Rung(problem, fitted.evaluation, ALONE))
     return begun(problem, fitted.guess or fitted.evaluation.point)
 
 

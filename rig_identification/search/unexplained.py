@@ -16,12 +16,13 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.latent import AVERAGED, MissingWrench
-from rig_identification.mismatch.locate import DRIVE, find_liar
+from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.something_loose import loose_finding
 from rig_identification.mismatch.unknown import missing_finding
 from rig_identification.result import Finding, Mismatch
 from rig_identification.search.ladder import Rung, fitted_at
 from rig_identification.search.levels import ALONE
+from rig_identification.search.liar import liar_of
 from rig_identification.search.search import Outcome
 
 Array = NDArray[np.float64]
@@ -51,8 +52,7 @@ def unexplained(ideal: Ideal, outcome: Outcome, budget: Budget, notify: Notify) 
         alternatives = tuple(rival(likeliest.trial(c), 0.0) for c in likeliest.found)
         named = ", ".join(called(c.effect, c.where) for c in likeliest.found)
         explanation += f" {named} would take away a part of it, which does not convince."
-    liar = find_liar(ideal.fitted.problem, ideal.fitted.evaluation, budget)
-    device = None if liar is None else liar.device
+    device = liar_of(outcome.first.rung, budget)
     if device in (None, DRIVE):
         # What knocks at the body moves all witnesses: where all but one device agree, nothing does
         for others, base in _bases(ideal, outcome.partly, partly):
