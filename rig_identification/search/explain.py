@@ -48,7 +48,7 @@ def explain(
     taut = taut_ideal(ideal, spells, notify)
     if taut is None:
         return slack_alone(ideal, spells)
-    found = explain(taut, [], notify, budget)
+    found = explain(taut, [], notify, budget, seen=seen)
     return with_slack(found or Explained(taut.fitted, taut.mismatch, taut), ideal, spells)
 
 
