@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import Ideal, only_watched
 from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.hypotheses import catalogue, count_of
+from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.expand import Standing, children
@@ -33,8 +31,8 @@ IDLE = 2
 EXPANDED = 4
 #: The level from which on whole runs are fitted without a discrepancy: a stronger one is no trace.
 NEARLY_ALONE = ALONE - 2
-#: Log evidence beyond the logarithm of the number of hypotheses that an effect has to gain.
-NEEDED = 5.0
+#: Log evidence that an effect has to gain: of chance among many hypotheses the screening is charged already.
+NEEDED = 3.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,6 @@ def search(
     """
     problem = problem_of(ideal)
     candidates = catalogue(problem)
-    needed = NEEDED + float(np.log(count_of(candidates)))
     start = Standing(first)
     queue, idle = [start], {id(start): 0}
     likeliest, told, partly = start, None, None
@@ -92,7 +89,7 @@ def search(
             notify(f"search: {label}", (turn + 0.5) / (EXPANDED + 1))
 
         every = children(problem, standing, candidates, budget, say, None if turn else promises)
-        every = [child for child in every if child.evidence > standing.evidence + needed]
+        every = [child for child in every if child.evidence > standing.evidence + NEEDED]
         if not every:
             continue
         best = every[0]
