@@ -1,8 +1,7 @@
-"""Which witness lies: the model fitted without each device in turn, and without each stretch of time.
+"""Which witness lies: the model fitted without each device in turn.
 
-An error of one device contradicts all others, which agree among themselves once it is not
-heard. A push contradicts everything for a moment, and nothing before and after. Physics that acts on the
-body all the time leaves no such subset in peace.
+An error of one device contradicts all others, which agree among themselves once it is not heard. Physics that
+acts on the body leaves no device in peace.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``report.html``: one self-contained page for a lab engineer (ADR 0004)."""
+"""``report.html``: one self-contained page for a lab engineer (ADR 0003)."""
 
 from __future__ import annotations
 

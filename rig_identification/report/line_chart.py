@@ -1,4 +1,4 @@
-"""Line charts as inline SVG whose colours are the page's own (see ADR 0004)."""
+"""Line charts as inline SVG whose colours are the page's own (see ADR 0003)."""
 
 from __future__ import annotations
 
