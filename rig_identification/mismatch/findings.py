@@ -63,8 +63,6 @@ def finding(
     )
 
 
-#: Least gap (nats) of what was not fitted.
-NO_TIE = 10.0
 #: Of what is told of readings before anything is fitted.
 NO_EVIDENCE: dict[str, float | None] = {
     "log_likelihood_gain": None,

@@ -29,17 +29,6 @@ STRONGER, ENOUGH = 3.0, 1.1
 ROUNDS = 2
 
 
-def fitting_wrench(problem: Problem, point: Point, mass: float) -> tuple[Problem, Point] | None:
-    """The problem with a random wrench about as strong as what the model lacks; see :func:`with_wrench`."""
-    widest = with_wrench(problem, replace(point, latents=()), mass)
-    if widest is None or widest[0].extra_noise is None:
-        return widest
-    weight = np.diag(widest[0].extra_noise)
-    parts = [latent**2 / weight for latent in widest[1].latents if latent is not None]
-    size = float(np.sqrt(np.mean(np.concatenate(parts))))
-    return with_wrench(problem, widest[1], mass, max(LEAST, SHARE * size))
-
-
 def with_wrench(
     problem: Problem, point: Point, mass: float, share: float = SHARE
 ) -> tuple[Problem, Point] | None:
@@ -78,22 +67,6 @@ def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Eval
             break
         found = found[0], moved
     return found
-
-
-def driven(problem: Problem, point: Point, mass: float) -> tuple[Problem, Evaluation] | None:
-    """The problem with a random wrench about as strong as what the model lacks, about the measured motion.
-
-    None where a run cannot be followed. Quicker than :func:`measured`, whose wrench is the weakest. What is
-    left beyond ``ENOUGH`` no wrench on the body explains.
-    """
-    there = fitting_wrench(problem, point, mass)
-    found = None if there is None else evaluate(*there)
-    if there is None or found is None:
-        return None
-    for _ in range(ROUNDS):
-        moved = _smoothed(there[0], found) if misfit(found) > ENOUGH else None
-        found = found if moved is None else moved
-    return there[0], found
 
 
 def _smoothed(problem: Problem, evaluation: Evaluation) -> Evaluation | None:

@@ -64,7 +64,6 @@ class Promise:
     share: float = 0.0  # of what the ideal model leaves, to first order, that it takes away
     charge: float | None = None  # nats that evidence charges it for what it could have explained, if known
     elsewhere: tuple[Promise, ...] = ()  # about as much of the same, at other numbers
-    steady: bool = False  # nothing but a pull that is always there
 
 
 def with_reference(problem: Problem, rest: State) -> Problem:
@@ -120,8 +119,7 @@ def screen(
     for probe in (_promise(wide, beyond, boxed, c) for c in probes):
         out += _supports(problem, mass, probe)
     placed = [
-        Promise(hose, gain, values, steady=steady)
-        for hose, gain, values, steady in placed_tethers(wide, full, beyond, candidates)
+        Promise(hose, gain, values) for hose, gain, values in placed_tethers(wide, full, beyond, candidates)
     ]
     instead = {p.candidate.label for p in placed}
     out = [*(p for p in out if p.candidate.label not in instead), *placed]

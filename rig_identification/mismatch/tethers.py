@@ -254,10 +254,10 @@ def _hoses(mass: float, problem: Problem, evaluation: Evaluation) -> list[tuple[
 
 def placed_tethers(
     wide: Problem, evaluation: Evaluation, beyond: Beyond, candidates: Sequence[Candidate]
-) -> list[tuple[Candidate, float, dict[str, float], bool]]:
-    """Each tether where it promises most: candidate, gain (nats), values, whether it is steady.
+) -> list[tuple[Candidate, float, dict[str, float]]]:
+    """Each tether where it promises most: candidate, gain (nats), values.
 
-    Steady is what promises no more than a pull: near the noise a hose along one axis may be that.
+    Near the noise a hose along one axis may promise no more than a pull.
 
     wide: the problem of ``evaluation`` with the tethers' parameters free, none of them in its model so far.
     """
@@ -283,7 +283,7 @@ def placed_tethers(
     matrix = found.information((*runs, *rests)).reshape(len(names), TERMS, len(names), TERMS)
     right = found.right.reshape(len(names), TERMS)
     near = misfit(evaluation) < NEAR_SQUARE
-    out: list[tuple[Candidate, float, dict[str, float], bool]] = []
+    out: list[tuple[Candidate, float, dict[str, float]]] = []
     for candidate in chosen:
         own = [q for q in candidate.parameters if not q.name.startswith("tether.point.")]
         mixed = _mixing(own, [free[name][1] for name in names])
@@ -299,7 +299,7 @@ def placed_tethers(
         if best is None or (steady and (not near or candidate.positive > 1)):
             out.append((candidate, 0.0, {}, False))
         else:
-            out.append((candidate, best.gain, _values(own, [q for _, q in points], best), steady))
+            out.append((candidate, best.gain, _values(own, [q for _, q in points], best)))
     return out
 
 

@@ -109,8 +109,6 @@ def _alternative(alternative: Mapping[str, object]) -> AlternativeView:
     if isinstance(parameters, Mapping) and parameters:
         name, value, half, unit = _parameter(*next(iter(parameters.items())))
         amount = f"{name} {value} ± {half} {unit}" if half else f"{name} {value} {unit}"
-    elif alternative.get("fitted") is False:
-        amount = "not fitted: the work was done"
     elif alternative.get("statement"):
         amount = str(alternative["statement"])
     return AlternativeView(
