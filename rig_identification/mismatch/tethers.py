@@ -297,7 +297,7 @@ def placed_tethers(
         )
         steady = best is not None and best.positive < STIFF
         if best is None or (steady and (not near or candidate.positive > 1)):
-            out.append((candidate, 0.0, {}, False))
+            out.append((candidate, 0.0, {}))
         else:
             out.append((candidate, best.gain, _values(own, [q for _, q in points], best)))
     return out
