@@ -15,6 +15,7 @@ from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, wi
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided
 from rig_identification.mismatch.whole_runs import Heard, unheard
+from rig_identification.search.disagreeing import where_runs_disagree
 from rig_identification.search.events import event_beside, event_of, explained_outside, standing_out
 from rig_identification.search.expand import worthy
 from rig_identification.search.ladder import Rung
@@ -96,6 +97,9 @@ def _explain(
         found = explained_outside(ideal, event, rest_explained, notify, chief=True)
         if found is not None:
             return found
+    agreed = where_runs_disagree(ideal, notify, budget) if first.alone and not watched else None
+    if agreed is not None:
+        return agreed
     outcome = search(ideal, first, notify, budget, heard)
     if outcome.told is not None or watched:
         return outcome.told
