@@ -110,7 +110,7 @@ def children(
         down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
         if down is not None:
             walked.append(replace(child, rung=down))
-            walked += _closer(problem, walked[-1], say)
+            walked += _closer(problem, walked[-1], budget, say)
     ordinary = ordinary_errors(problem)
     sensible = (_earned(standing, s) for s in walked if _makes_sense(s, ordinary))
     return sorted(sensible, key=lambda s: -s.evidence)
@@ -241,7 +241,7 @@ def _entered(
     return wide, beside(rung.problem, there, wide, rung.evaluation)
 
 
-def _closer(problem: Problem, standing: Standing, say: Say) -> Iterator[Standing]:
+def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> Iterator[Standing]:
     """The model with closer descriptions of its effects that first order cannot tell from them.
 
     Each takes the place of its effect. With a second effect in the model a closer description of the first
@@ -255,6 +255,8 @@ def _closer(problem: Problem, standing: Standing, say: Say) -> Iterator[Standing
         others = (*standing.found[:k], *standing.found[k + 1 :])
         parent = replace(extended(problem, others), discrepancy=rung.problem.discrepancy)
         for closer, values in asked(rung.problem, rung.evaluation):
+            if budget.spent():
+                return
             say(closer.label)
             wide, point = _entered(rung, parent, _without(problem, standing, k), closer, values)
             down = walked_down(wide, point, rung.level)
