@@ -20,6 +20,7 @@ from rig_identification.estimate.solve import Evaluation, excess, solve
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.whole_runs import Named, whole_runs
@@ -49,19 +50,26 @@ def where_runs_disagree(ideal: Ideal, notify: Notify, budget: Budget) -> Explain
     def say(label: str) -> None:
         notify(f"search: {label}", 0.2)
 
-    for child in children(together.model, Standing(together), candidates, budget, say):
+    every = children(together.model, Standing(together), candidates, budget, say)
+    for child in every:
         if budget.late():
             break
         say(f"whole runs with {child.label}")
         found = tuple(sparse(together.model, [child.trial(child.found[-1])], budget))
         try:
             # What held-out runs had a part in is no claim on the body
-            told = whole_runs(ideal, Named(problem, found, budget))
+            told = whole_runs(ideal, Named(problem, found, budget, _rivals(child, every)))
         except (FloatingPointError, np.linalg.LinAlgError):
             continue
         if told.wholly:
             return in_words(_told(told, fitted), list(found))
     return None
+
+
+def _rivals(told: Standing, every: list[Standing]) -> tuple[dict[str, object], ...]:
+    """What trails the one that is told, as entries of ``alternatives``."""
+    others = [s for s in every if s is not told and s.evidence <= told.evidence]
+    return tuple(rival(s.trial(s.found[-1]), told.evidence - s.evidence) for s in others)
 
 
 def shows(evaluation: Evaluation) -> bool:

@@ -16,7 +16,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, net_gain
 from rig_identification.mismatch.in_motion import unearned
-from rig_identification.mismatch.late import lag_like
+from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.same_clock import contradicted
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.trial import (
@@ -44,6 +44,8 @@ SHARE = 0.1
 REACHED = 0.5
 #: Log evidence by which a hypothesis trails at the same level (odds of 1 to 20,000) that is no rival.
 RIVAL = 10.0
+#: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
+MEANT = 3.0
 #: Steps of the first fit of each. What a further step promises is counted: with four steps the same were the
 #: best, at a fourth more work (sessions of bench/concealed, labs).
 FIRST_STEPS = 2
@@ -113,7 +115,20 @@ def children(
             walked += _closer(problem, walked[-1], budget, say)
     ordinary = ordinary_errors(problem)
     sensible = (_earned(standing, s) for s in walked if _makes_sense(s, ordinary))
-    return sorted(sensible, key=lambda s: -s.evidence)
+    return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
+
+
+def _clocks_and_lags(ranked: list[Standing]) -> list[Standing]:
+    """The same with a lag before a clock only where the motion says so (late.py)."""
+    if not all(s.rung.alone for s in ranked):
+        return ranked
+    by_candidate = {id(s.found[-1]): s for s in ranked}
+    out = []
+    for trial in told_apart([s.trial(s.found[-1]) for s in ranked], MEANT):
+        standing = by_candidate[id(trial.candidate)]
+        lost = standing.evidence - trial.evidence
+        out.append(replace(standing, unearned=standing.unearned + lost))
+    return out
 
 
 def _earned(before: Standing, after: Standing) -> Standing:

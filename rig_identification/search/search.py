@@ -17,7 +17,7 @@ from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
-from rig_identification.search.expand import Standing, children
+from rig_identification.search.expand import MEANT, Standing, children
 from rig_identification.search.ladder import Rung, begun, climbed
 from rig_identification.search.levels import ALONE
 from rig_identification.search.whole import MOST_EFFECTS, in_whole_runs
@@ -31,8 +31,6 @@ IDLE = 2
 EXPANDED = 4
 #: The level from which on whole runs are fitted without a discrepancy: a stronger one is no trace.
 NEARLY_ALONE = ALONE - 2
-#: Log evidence that an effect has to gain: of chance among many hypotheses the screening is charged already.
-NEEDED = 3.0
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def search(
             notify(f"search: {label}", (turn + 0.5) / (EXPANDED + 1))
 
         every = children(problem, standing, candidates, budget, say, None if turn else promises)
-        every = [child for child in every if child.evidence > standing.evidence + NEEDED]
+        every = [child for child in every if child.evidence > standing.evidence + MEANT]
         if not every:
             continue
         best = every[0]

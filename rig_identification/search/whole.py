@@ -15,7 +15,6 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import compatible, count_of
-from rig_identification.mismatch.late import told_apart
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import Trial, mass_of
 from rig_identification.mismatch.undecided import undecided_beside
@@ -27,8 +26,6 @@ from rig_identification.search.levels import ALONE
 
 #: Effects that are told of a session at most.
 MOST_EFFECTS = 3
-#: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
-MEANT = 3.0
 #: Log evidence by which a hypothesis may trail that held-out runs are still asked about.
 CLOSE = 30.0
 
@@ -50,7 +47,7 @@ def in_whole_runs(
     """
     found = sparse(problem, [standing.trial(c) for c in standing.found], budget)
     alike = [o.trial(o.found[-1]) for o in others if _comparable(o, standing)]
-    ranked = told_apart([found[-1], *alike], MEANT)
+    ranked = [found[-1], *alike]
     earlier = tuple(found[:-1])
     say("whole runs with " + standing.label)
     try:
