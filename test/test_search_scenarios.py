@@ -1,7 +1,4 @@
-"""Sessions with one or two things left out: what an answer has to name of them, and where.
-
-Each is told in one word of the recording contract and a place; a place of None is not asked for.
-"""
+"""Sessions with one or two things left out: what an answer has to name of them, and where."""
 
 from __future__ import annotations
 
@@ -28,13 +25,13 @@ from wrong_sessions import (
 )
 
 from rig_identification.recording import Recording, Session
-from rig_identification.result import Finding, Identification
+from rig_identification.result import Finding
 from rig_identification.search.identify import identify
 from rig_identification.simulate import simulate_session
 from rig_identification.simulate.exciter import UnbalancedMass
 from rig_identification.simulate.start import Pulled
 
-#: What is asked of a finding: its place (channel, axis), and its first number with how far it may be off.
+#: What is asked of a finding: channel, axis and first number; None where any will do.
 Told = tuple[str | None, str | None, float | None]
 ANY: Told = (None, None, None)
 
@@ -44,7 +41,7 @@ class Scenario:
     """A session with something left out, and what an answer has to name."""
 
     make: Callable[[], Session]
-    told: dict[str, Told] = field(default_factory=dict)
+    told: dict[str, Told] = field(default_factory=dict)  # by effect, or by several of which one is told
     pushed: tuple[str, float, float] | None = None  # recording, start and end (s) of a push
 
 
@@ -84,7 +81,7 @@ def hose_that_a_held_out_run_shows() -> Session:
 
 
 def hinge_of_a_trifilar_and_an_inclinometer() -> Session:
-    """Of three parallel cables one upper hinge drawn too high by 20 mm, and an inclinometer off by 10 mrad."""
+    """Of three parallel cables one upper hinge drawn too high by 20 mm, and an inclinometer off 10 mrad."""
     session = tilted_trifilar()
     assert session.rig.inclinometer is not None
     turned = replace(session.rig.inclinometer, orientation=Rotation.from_rotvec([0.0, -0.01, 0.0]).as_quat())
@@ -203,11 +200,14 @@ SCENARIOS: dict[str, Scenario] = {
     "hinge_higher": Scenario(lambda: made(10, 10.0, 2, RAISED), {"hinge_position": ("cable_1", "z", None)}),
     "hinge_of_a_trifilar_and_inclinometer": Scenario(
         hinge_of_a_trifilar_and_an_inclinometer,
-        {"inclinometer_offset": ("inclinometer", None, None), "": ANY},
+        {
+            "inclinometer_offset": ("inclinometer", None, None),
+            "hinge_position or level_error or cable_length": ANY,
+        },
     ),
     "dry_hinges_and_cable_too_long": Scenario(
         lambda: made(14, 4.0, 4, {"hinge_friction": (4.0,), "cable_length": (0.0, 0.0, 0.02, 0.0)}),
-        {"hinge_friction": (None, None, 4.0), "": ANY},
+        {"hinge_friction": (None, None, 4.0), "cable_length or hinge_position": ANY},
     ),
     "soft_cables": Scenario(
         lambda: made(10, 4.0, 5, {"cable_elasticity": (3e5,), "cable_damping_ratio": (0.02,)}),
@@ -242,11 +242,47 @@ def assert_pushed(finding: Finding, recording: str, start: float, end: float) ->
     assert times["end"] > start
 
 
+#: Those that the gate runs: an effect of the model and a device, two devices, an event, an event beside an
+#: effect, what gives way, and a law.
+QUICK = {
+    "gyroscope_and_dry_hinges",
+    "clock_and_inclinometer",
+    "rotor_and_push",
+    "cable_too_long",
+    "ceiling_and_imu_off_its_place",
+    "hose_that_pulls",
+    "inclinometer_and_cell",
+    "brake_and_no_liquid",
+}
+#: Those that do not come out, and what came instead.
+OTHERWISE: dict[str, str] = {}
+
+
 def cases() -> list[object]:
     """The scenarios; all but a few are long."""
-    return [
-        pytest.param(
-            s, id=name, marks=[*([] if name in QUICK else [pytest.mark.long]), *OTHERWISE.get(name, [])]
-        )
-        for name, s in SCENARIOS.items()
-    ]
+    out = []
+    for name, scenario in SCENARIOS.items():
+        marks = [] if name in QUICK else [pytest.mark.long]
+        if name in OTHERWISE:
+            marks.append(pytest.mark.xfail(strict=False, reason=OTHERWISE[name]))
+        out.append(pytest.param(scenario, id=name, marks=marks))
+    return out
+
+
+@pytest.mark.parametrize("scenario", cases())
+def test_what_is_left_out_is_named(scenario: Scenario) -> None:
+    found = identify(scenario.make())
+    mismatch = found.mismatch
+    named = {f.effect: f for f in mismatch.findings}
+    assert mismatch.verdict == "explained", mismatch.explanation
+    assert len(named) == len(mismatch.findings)
+    push = named.pop("external_force", None)
+    assert (push is not None) is (scenario.pushed is not None)
+    if push is not None and scenario.pushed is not None:
+        assert_pushed(push, *scenario.pushed)
+    for effects, told in scenario.told.items():
+        # What is alike to first order is as right
+        (effect,) = set(effects.split(" or ")) & set(named)
+        assert_told(named.pop(effect), told)
+    assert not named
+    assert found.holdout_error is None or found.holdout_error < 1.1
