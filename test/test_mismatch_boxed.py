@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_mismatch_two_errors import wrong
 from test_simulate_identify import shaken
+from wrong_sessions import wrong
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import Promise, promises_of, with_reference
-from rig_identification.mismatch.trial import Trial, fitted_to_its_end
+from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.trial import Trial, fitted_to_its_end, mass_of
 from rig_identification.recording import Session
 from rig_identification.simulate import simulate_session
 
@@ -39,7 +39,8 @@ def promised_and_kept(session: Session, tolerances: float) -> tuple[Fitted, Prom
     fitted = fit_session(loud, lambda stage, share: None, None)
     problem = with_reference(fitted.problem, fitted.rest)
     zeros = [c for c in catalogue(problem) if c.effect == CELL and c.where["channel"] == cable]
-    (promise,) = promises_of(problem, fitted.evaluation, zeros)
+    promises = screen(problem, fitted.evaluation, zeros, mass_of(problem, fitted.evaluation))
+    (promise,) = (p for p in promises if p.candidate in zeros)
     trial = fitted_to_its_end(problem, fitted.evaluation, promise)
     assert trial is not None
     return fitted, promise, trial

@@ -9,16 +9,15 @@ import pytest
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import Ideal, fit_session, judged
-from rig_identification.estimate.solve import excess, solve
+from rig_identification.estimate.solve import solve
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.standing import Search
 from rig_identification.mismatch.trial import Trial, may_be_none
-from rig_identification.mismatch.whole_runs import as_fitted, fitted_whole, pruned
+from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, pruned
 from rig_identification.recording import Recording
 from rig_identification.simulate import simulate_session
 
@@ -45,7 +44,7 @@ def ideal() -> Ideal:
     return Ideal(fitted, *judged(fitted))
 
 
-def _with(ideal: Ideal, labels: list[str]) -> tuple[Explained, Search]:
+def _with(ideal: Ideal, labels: list[str]) -> tuple[Explained, Named]:
     """Whole runs with some effects of the catalogue."""
     fitted = ideal.fitted
     problem = with_reference(fitted.problem, fitted.rest)
@@ -53,9 +52,9 @@ def _with(ideal: Ideal, labels: list[str]) -> tuple[Explained, Search]:
     chosen: list[Candidate] = [known[label] for label in labels]
     here = extended(problem, tuple(chosen))
     point = carried(here, problem, fitted.evaluation.point)
-    search = Search(problem, here, fitted.evaluation, excess(fitted.evaluation), UNLIMITED)
-    search.found = [Trial(c, here, fitted.evaluation, 0.0) for c in chosen]
-    return fitted_whole(ideal, search, search.found, here, point), search
+    found = tuple(Trial(c, here, fitted.evaluation, 0.0) for c in chosen)
+    named = Named(problem, found, UNLIMITED)
+    return fitted_whole(ideal, named, list(found), here, point), named
 
 
 @pytest.fixture(scope="module")
@@ -104,13 +103,13 @@ def test_one_alone_is_worth_what_it_gains_over_the_ideal_model(ideal: Ideal) -> 
 
 def test_what_may_as_well_be_none_is_no_finding(ideal: Ideal) -> None:
     labels = ["inclinometer_offset inclinometer y", "hinge_damping", "hinge_friction"]
-    three, search = _with(ideal, labels)
+    three, named = _with(ideal, labels)
     rubbing = next(t for t in three.effects if t.candidate.effect == "hinge_friction")
     assert may_be_none(as_fitted(three.fitted, rubbing))
     told = {"inclinometer_offset", "hinge_damping"}
     assert {f.effect for f in three.mismatch.findings} == told | {"hinge_friction"}
     assert {f.effect for f in each_by_itself(three, never).mismatch.findings} == told
-    assert {f.effect for f in pruned(three, search, 100).mismatch.findings} == told
+    assert {f.effect for f in pruned(three, named, 100).mismatch.findings} == told
 
 
 def test_without_time_no_gain_is_told(both: Explained) -> None:

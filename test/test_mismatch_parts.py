@@ -18,8 +18,9 @@ from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.estimate.whitening import whiten
-from rig_identification.mismatch.latent import MissingWrench, joined, strongest_push
+from rig_identification.mismatch.latent import MissingWrench, strongest_push
 from rig_identification.mismatch.law import law_of
+from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.places import crossed, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.rider_places import travel_along
@@ -29,6 +30,7 @@ from rig_identification.mismatch.supports import (
     ceiling_candidate,
     largest_compliance,
 )
+from rig_identification.mismatch.unknown import missing_finding, push_finding
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import State
@@ -86,10 +88,37 @@ def test_a_push_is_found_with_its_force_time_and_line() -> None:
     assert np.allclose(push.point[[0, 2]], at[[0, 2]], atol=0.05)
 
 
-def test_pieces_are_joined_in_order() -> None:
-    whole = swinging(np.zeros((2000, 3)), motion())
-    late = replace(whole, time=whole.time + 100.0)
-    assert np.all(np.diff(joined([late, whole]).time) > 0.0)
+def test_a_push_is_told_as_a_force_from_outside() -> None:
+    t, rig = 0.01 * np.arange(2000), thesis_case_14().rig
+    size = np.where((t > 8.0) & (t < 9.0), 120.0 * np.sin(np.pi * (t - 8.0)), 0.0)
+    found = push_finding(swinging(np.outer(size, [0.0, 1.0, 0.0]), motion()), rig)
+    assert found.effect == "external_force"
+    (times,) = found.where["times"]  # type: ignore[misc]
+    assert times["recording"] == "run_1"
+    assert times["start"] == pytest.approx(8.05, abs=0.06)
+    assert times["end"] == pytest.approx(8.95, abs=0.06)
+    assert found.parameters["peak_force_y"]["value"] == pytest.approx(120.0, abs=1.0)
+    assert abs(found.parameters["peak_force_x"]["value"]) < 1.0
+
+
+def test_what_nothing_explains_is_told_with_its_strength_axis_and_law() -> None:
+    states, rig = motion(), thesis_case_14().rig
+    force = 0.2 * np.random.default_rng(1).standard_normal((2000, 3))
+    force[:, 1] -= 4000.0 * states[:, 1] ** 3
+    missing = swinging(force, states)
+    found = missing_finding(missing, rig, None)
+    assert (found.effect, found.where["axis"], found.where["channel"]) == ("unknown", "y", None)
+    rms = float(np.std(force[:, 1]))
+    assert found.parameters["force"]["value"] == pytest.approx(rms, rel=0.02)
+    assert "the cube of displacement along y" in found.statement
+    # Where all but one device agree it is that device, and nothing acts on the body
+    blamed = missing_finding(missing, rig, "imu")
+    assert blamed.where["channel"] == "imu"
+    assert blamed.statement.startswith("Everything but imu agrees")
+    # Nobody measured what acts at the exciter: it may be anything that acts on the body
+    driven = missing_finding(missing, rig, DRIVE)
+    assert driven.where["channel"] is None
+    assert "A force at the exciter" in driven.statement
 
 
 def test_a_massless_rider_travels_as_its_equation_says() -> None:

@@ -9,8 +9,7 @@ import pytest
 from test_simulate_identify import seen_by_the_true_body, shaken
 
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
-from rig_identification.mismatch.candidate import MANY, Candidate, added
-from rig_identification.mismatch.hypotheses import as_likely, catalogue
+from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.places import TERMS, best_place, crossed, design, monomials
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.trial import Trial, in_reach, mass_of, possible
@@ -93,25 +92,6 @@ def test_monomials_follow_from_their_design_and_cross_products_are_polynomials()
     whole = np.cross(a @ np.array([1.0, *u]), b @ np.array([1.0, *u]))
     assert crossed(a, b) @ monomials(u) == pytest.approx(whole)
     assert np.linalg.matrix_rank(monomials(design())) == TERMS
-
-
-def test_an_effect_of_few_places_is_fitted_beside_one_of_many() -> None:
-    """A level of two places that promises less than one hinge of twenty-four may be as likely."""
-    hinge, level, cell, slow = (
-        Candidate(effect, (added(f"{effect}.amount", "1", 1.0, 0),) * count, "", "", places=places)
-        for effect, count, places in (
-            ("hinge_position", 1, 24),
-            ("level_error", 1, 2),
-            ("load_cell_gain", 1, 4),
-            ("tether", MANY, 1),
-        )
-    )
-    worthy = [Promise(hinge, 9.5, {})]
-    promises = [*worthy, Promise(slow, 9.0, {}), Promise(level, 6.0, {}), Promise(cell, 4.5, {})]
-    assert as_likely(promises, worthy, 3.0) == [promises[2]]
-    assert as_likely(promises, worthy, 4.0) == [promises[2], promises[3]]
-    assert as_likely([*promises, Promise(level, 5.9, {})], worthy, 3.0) == [promises[2]]
-    assert as_likely(promises, [], 3.0) == []
 
 
 def _with_number(label: str, name: str, value: float) -> Trial:

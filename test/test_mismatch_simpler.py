@@ -10,12 +10,15 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import promises_of, with_reference
-from rig_identification.mismatch.simpler import fitted_simpler, special_cases
-from rig_identification.mismatch.trial import Trial, attempt, finished
+from rig_identification.mismatch.screen import screen, with_reference
+from rig_identification.mismatch.trial import fitted_to_its_end, mass_of
 from rig_identification.recording import Recording
+from rig_identification.search.expand import Standing, _alike, special_cases
+from rig_identification.search.ladder import Rung
+from rig_identification.search.levels import ALONE
 from rig_identification.simulate import simulate_session
 
 #: rad/s too much about y, and rad/s per m/s^2 of the x axis.
@@ -38,22 +41,25 @@ def _fitted(felt: float) -> tuple[Problem, Evaluation]:
     return with_reference(fitted.problem, fitted.rest), fitted.evaluation
 
 
-def _tried(problem: Problem, evaluation: Evaluation, label: str) -> tuple[Trial, list[Candidate]]:
-    candidates = catalogue(problem)
-    larger = next(c for c in candidates if c.label == label)
-    begun = attempt(problem, evaluation, *promises_of(problem, evaluation, [larger]))
-    trial = None if begun is None else finished(begun)
+def _child(standing: Standing, candidates: list[Candidate], label: str) -> Standing:
+    """A model with one more effect."""
+    problem, evaluation = standing.rung.problem, standing.rung.evaluation
+    promises = screen(problem, evaluation, candidates, mass_of(problem, evaluation))
+    trial = fitted_to_its_end(problem, evaluation, next(p for p in promises if p.candidate.label == label))
     assert trial is not None
-    return trial, candidates
+    return Standing(Rung(trial.problem, trial.evaluation, ALONE), (trial.candidate,))
 
 
 @pytest.mark.parametrize(("felt", "likelier"), [(0.0, SMALLER), (FELT, LARGER)])
 def test_evidence_tells_the_special_case_from_the_whole(felt: float, likelier: str) -> None:
     problem, evaluation = _fitted(felt)
-    trial, candidates = _tried(problem, evaluation, LARGER)
-    simple = list(fitted_simpler(problem, trial, candidates))
-    assert [t.candidate.label for t in simple] == [SMALLER]
-    assert max([trial, *simple], key=lambda t: t.evidence).candidate.label == likelier
+    candidates, ideal = catalogue(problem), Standing(Rung(problem, evaluation, ALONE))
+    larger = _child(ideal, candidates, LARGER)
+    simple = _alike(ideal, [larger], candidates, UNLIMITED, lambda label: None)
+    assert [child.label for child in simple] == [SMALLER]
+    assert max([larger, *simple], key=lambda child: child.rung.evidence).label == likelier
+    # What was fitted already is not fitted again
+    assert _alike(ideal, [larger, *simple], candidates, UNLIMITED, lambda label: None) == []
 
 
 def test_what_has_no_special_case_has_none() -> None:

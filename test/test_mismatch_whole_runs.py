@@ -6,17 +6,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_mismatch_disagreeing import _fitted
+from test_simulate_identify import shaken
 
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import evaluate
 from rig_identification.mismatch.whole_runs import _along_what_happened, strayed
+from rig_identification.simulate import simulate_session
+from rig_identification.simulate.exciter import UnbalancedMass
+from rig_identification.simulate.start import Pulled
 
 
 @pytest.fixture(scope="module")
 def clean() -> Fitted:
-    return _fitted(0.0)
+    """Shaken at one frequency; held out, pulled aside and let go."""
+    spec = shaken(10, 12.0)
+    weight, at = float(spec.elements[0]) * spec.rig.gravity, spec.elements[1:4]
+    motor = UnbalancedMass(0.03 * weight / (2.0 * np.pi * 1.1) ** 2, 1.1, ramp=2.0)
+    pull = Pulled(0.1 * weight * np.array([0.1, 1.0, 0.0]), at + np.array([0.6, 0.1, 0.0]))
+    free = replace(spec.runs[0], name="run_2", holdout=True, start=pull, force=None)
+    spec = replace(spec, runs=(replace(spec.runs[0], force=motor), free))
+    return fit_session(simulate_session(spec, np.random.default_rng(2))[0])
 
 
 def elements(fitted: Fitted) -> np.ndarray:

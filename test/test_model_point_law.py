@@ -14,11 +14,13 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.growing import misfit
-from rig_identification.mismatch.budget import Budget
-from rig_identification.mismatch.lawful import law_trial
-from rig_identification.mismatch.trial import mass_of
+from rig_identification.mismatch.budget import UNLIMITED
+from rig_identification.mismatch.trial import fitted_to_its_end
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Input, Motion, RigModel, simulate
+from rig_identification.search.ladder import Rung
+from rig_identification.search.laws import promised_laws, sparse
+from rig_identification.search.levels import ALONE
 
 Array = NDArray[np.float64]
 POINT = np.array([0.3, 0.5, -0.4])
@@ -126,8 +128,12 @@ def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float,
     spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
     problem, found = seen_by_the_true_body(spec, 3)
     before = misfit(found)
-    trial = law_trial(problem, found, mass_of(problem, found), Budget())
-    assert trial is not None
+    first = promised_laws(Rung(problem, found, ALONE), ())[0]
+    begun = fitted_to_its_end(problem, found, first)
+    assert begun is not None
+    # Beside a law another one is not asked for
+    assert promised_laws(Rung(begun.problem, begun.evaluation, ALONE), (begun.candidate,)) == []
+    (trial,) = sparse(problem, [begun], UNLIMITED)
     assert before > 1.5
     assert misfit(trial.evaluation) < 1.03
     told = trial.candidate.told(estimates(trial.problem, trial.evaluation))

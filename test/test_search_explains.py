@@ -9,22 +9,22 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import Ideal, fit_session, judged, near_noise
 from rig_identification.mismatch.budget import UNLIMITED
-from rig_identification.mismatch.explained import Explained
-from rig_identification.search.ladder import Rung
-from rig_identification.search.search import search
+from rig_identification.search.search import Outcome, first_rung, search
 from rig_identification.simulate import SessionSpec, simulate_session
 
 
-def searched(
-    spec: SessionSpec, effects: dict[str, tuple[float, ...]], seed: int
-) -> tuple[Explained | None, Rung | None]:
+def searched(spec: SessionSpec, effects: dict[str, tuple[float, ...]], seed: int) -> Outcome:
     """What the search finds of a session with ``effects`` far beyond the noise, with a held-out run."""
     (run,) = spec.runs
     spec = replace(spec, effects=effects, runs=(run, replace(run, name="run_2", holdout=True)))
     session, _ = simulate_session(spec, np.random.default_rng(seed))
     fitted = fit_session(session)
     assert not near_noise(fitted)
-    return search(Ideal(fitted, *judged(fitted)), lambda label, fraction: None, UNLIMITED)
+    ideal = Ideal(fitted, *judged(fitted))
+    first = first_rung(ideal)
+    assert first is not None
+    assert not first.alone
+    return search(ideal, first, lambda label, fraction: None, UNLIMITED)
 
 
 def test_a_fifth_of_the_body_on_springs_is_found_with_all_its_frequencies() -> None:
@@ -36,8 +36,9 @@ def test_a_fifth_of_the_body_on_springs_is_found_with_all_its_frequencies() -> N
         "sprung_mass.damping_ratio": (0.08,),
         "sprung_mass.position": tuple(float(c) for c in spec.elements[1:4]),
     }
-    found, rung = searched(spec, effects, 11)
-    assert rung is not None
+    outcome = searched(spec, effects, 11)
+    assert outcome.likeliest.label == "sprung_mass"
+    found = outcome.told
     assert found is not None
     assert found.told
     (finding,) = found.mismatch.findings

@@ -11,7 +11,7 @@ BRAKE, POINT = 300.0, (0.2, 0.4, -0.3)
 
 def test_a_strong_brake_is_told_as_a_law_of_one_point() -> None:
     effects = {"point_law.brake": (BRAKE, 0.0), "point_law.position": POINT}
-    found, _ = searched(shaken(14, 10.0), effects, 3)
+    found = searched(shaken(14, 10.0), effects, 3).told
     assert found is not None
     assert found.told
     (finding,) = found.mismatch.findings

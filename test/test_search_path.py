@@ -11,11 +11,11 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.force_noise import Discrepancy
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.identify import _begun, _silent, pose_problem
+from rig_identification.estimate.identify import _begun, _silent, fit_session, near_noise, pose_problem
 from rig_identification.estimate.solve import evaluate
 from rig_identification.model.effects import place
 from rig_identification.model.equilibrium import find_rest, wrench_response
-from rig_identification.search.ladder import LOST, begun, fitted_at
+from rig_identification.search.ladder import LOST, Rung, begun, climbed, fitted_at
 from rig_identification.search.levels import ALONE, LEVELS, at_level
 from rig_identification.search.path import found_from
 from rig_identification.simulate import simulate_session
@@ -113,3 +113,20 @@ def test_a_motion_that_an_effect_lost_is_found_again() -> None:
     as_well = evaluate(at_level(start.problem, mass, level), never_lost)
     assert as_well is not None
     assert misfit(found.evaluation) < 1.05 * misfit(as_well)
+
+
+@pytest.mark.parametrize(("damping", "alone"), [(0.0, True), (1.0, False)])
+def test_near_the_noise_a_wrench_is_asked_for_only_where_something_is_left(
+    damping: float, alone: bool
+) -> None:
+    spec = replace(shaken(10, 10.0), effects={"hinge_damping": (damping,)} if damping else {}, doubts=False)
+    fitted = fit_session(simulate_session(spec, np.random.default_rng(5))[0])
+    assert near_noise(fitted)
+    rung = climbed(fitted.problem, fitted.evaluation)
+    assert rung.alone is alone
+    if alone:
+        assert rung.evaluation is fitted.evaluation
+    else:
+        assert rung.evidence > Rung(fitted.problem, fitted.evaluation, ALONE).evidence
+        # The strongest wrench is not what the evidence asks for
+        assert rung.level > 0
