@@ -5,6 +5,6 @@ there say nothing. With a random wrench in the model (levels.py) its motion foll
 residuals are nearly linear in every parameter. The evidence tells how strong the wrench has to be, from what
 carries anything to none (ladder.py). Every effect is screened where the model at hand stands; the best are
 fitted, each at its own level (expand.py). The likeliest model is expanded next (search.py), until whole runs,
-held-out ones among them, are explained (whole.py). What acts for seconds stands out of the wrench (events.py);
-what nothing explains is told from it (unexplained.py).
+held-out ones among them, are explained (whole.py). What acts for seconds stands out of it (events.py);
+what nothing explains is told from the wrench (unexplained.py).
 """
