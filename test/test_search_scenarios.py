@@ -255,10 +255,7 @@ QUICK = {
     "brake_and_no_liquid",
 }
 #: Those that do not come out, and what came instead.
-OTHERWISE: dict[str, str] = {
-    "gyroscope_and_dry_hinges": "explained as a gyroscope's cross-sensitivity with its own bias, and "
-    "hinge_friction: the sensitivity is (3 +- 3)e-4, and its special case, imu_bias x, is not told instead",
-}
+OTHERWISE: dict[str, str] = {}
 
 
 def cases() -> list[object]:

@@ -77,7 +77,8 @@ def begun(problem: Problem, point: Point) -> Rung | None:
     for level in (MIDDLE, 0):
         found = found_from(_at(problem, point, level), point)
         rung = None if found is None else walked_down(problem, found, level)
-        if rung is not None and misfit(rung.evaluation) < LOST:
+        if rung is not None and (level == 0 or misfit(rung.evaluation) < LOST):
+            # At the strongest wrench what is left lies in a device that no force accounts for
             return rung if rung.level > level else climbed(rung)
     return None
 

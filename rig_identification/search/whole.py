@@ -16,10 +16,18 @@ from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import compatible, count_of
 from rig_identification.mismatch.screen import screen
-from rig_identification.mismatch.trial import Trial, mass_of
+from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
 from rig_identification.mismatch.undecided import undecided_beside
-from rig_identification.mismatch.whole_runs import Heard, Named, as_fitted, pruned, unheard, whole_runs
-from rig_identification.search.expand import Say, Standing, children, worthy
+from rig_identification.mismatch.whole_runs import (
+    Heard,
+    Named,
+    as_fitted,
+    fitted_whole,
+    pruned,
+    unheard,
+    whole_runs,
+)
+from rig_identification.search.expand import Say, Standing, children, special_cases, worthy
 from rig_identification.search.ladder import Rung
 from rig_identification.search.laws import in_words, sparse
 from rig_identification.search.levels import ALONE
@@ -55,6 +63,7 @@ def in_whole_runs(
         best = whole_runs(ideal, named)
         if best.wholly:
             named, best = _likeliest(ideal, named, best, ranked, say)
+            named, best = _simplified(ideal, named, best, candidates, say)
             best = _alone_or_with_one_more(ideal, problem, best, named, candidates, say)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
@@ -117,6 +126,28 @@ def _likeliest(
     its = _beside_rivals(replace(its, found=(*earlier, replace(last, evidence=said[chosen]))), trailing)
     told = replace(found.mismatch, alternatives=its.rivals)
     return its, replace(found, mismatch=told, bodies=its.bodies)
+
+
+def _simplified(
+    ideal: Ideal, named: Named, best: Explained, candidates: list[Candidate], say: Say
+) -> tuple[Named, Explained]:
+    """What explains all, each effect as its special case where that is likelier.
+
+    Beside something else that is wrong a cell that feels its neighbour, and is off, explains more than one
+    that is off. Once the other thing is known it may explain no more.
+    """
+    for trial in named.found:
+        for simple in special_cases(trial.candidate, candidates):
+            if named.budget.spent():
+                return named, best
+            say("whole runs with " + simple.label)
+            found = [replace(trial, candidate=simple) if t is trial else t for t in named.found]
+            now = best.fitted
+            less = fitted_whole(ideal, named, found, now.problem, now.evaluation.point)
+            if less.wholly and log_evidence(less.fitted.evaluation) > log_evidence(now.evaluation):
+                fitted = tuple(as_fitted(less.fitted, t) for t in found)
+                return _simplified(ideal, replace(named, found=fitted), less, candidates, say)
+    return named, best
 
 
 def _alone_or_with_one_more(
