@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import AXES, INERTIAL
-from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.boxed import Boxed, probed_of
 from rig_identification.mismatch.candidate import Candidate
@@ -61,7 +61,6 @@ class Promise:
     candidate: Candidate
     gain: float  # nats
     values: dict[str, float]  # its parameters, in their own units
-    share: float = 0.0  # of what the ideal model leaves, to first order, that it takes away
     charge: float | None = None  # nats that evidence charges it for what it could have explained, if known
     elsewhere: tuple[Promise, ...] = ()  # about as much of the same, at other numbers
 
@@ -114,7 +113,7 @@ def screen(
     if opened is None:
         return []
     wide, beyond, boxed = opened
-    full, base = beyond.full, beyond.base
+    full = beyond.full
     out = [_promise(wide, beyond, boxed, c) for c in candidates]
     for probe in (_promise(wide, beyond, boxed, c) for c in probes):
         out += _supports(problem, mass, probe)
@@ -124,8 +123,6 @@ def screen(
     instead = {p.candidate.label for p in placed}
     out = [*(p for p in out if p.candidate.label not in instead), *placed]
     out += _riders(problem, beyond, mass)
-    left = max(1.0, excess(full) - _gain(full.information, full.gradient, base))
-    out = [replace(promise, share=promise.gain / left) for promise in out]
     return sorted(out, key=lambda promise: -promise.gain)
 
 

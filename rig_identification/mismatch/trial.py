@@ -90,12 +90,10 @@ def attempt(
     evaluation: Evaluation,
     promise: Promise,
     budget: Budget = UNLIMITED,
-    growing: bool = False,
 ) -> Trial | None:
     """A first, short fit of one hypothesis from what screening promised; None where it cannot start or be.
 
-    It ends where the ``budget`` is spent. growing: over the first instants before all of the runs, as what
-    changes the model is fitted: from a body that is far off whole pieces lead into another valley.
+    It ends where the ``budget`` is spent.
     """
     stop = budget.spent
     candidate = promise.candidate
@@ -103,7 +101,7 @@ def attempt(
     begun = carried(wide, problem, evaluation.point)
     point = promised(wide, begun, candidate, promise.values, evaluation)
     try:
-        if growing or candidate.build is not None:
+        if candidate.build is not None:
             far = misfit(evaluation) > NEAR_SQUARE
             point, left = _grown(wide, candidate, point, far, stop)
             if left > VERY_FAR and left > LARGER * _over_first(problem, evaluation):
