@@ -27,7 +27,7 @@ from rig_identification.mismatch.whole_runs import (
     unheard,
     whole_runs,
 )
-from rig_identification.search.expand import Say, Standing, children, special_cases, worthy
+from rig_identification.search.expand import MEANT, Say, Standing, children, special_cases, worthy
 from rig_identification.search.ladder import Rung
 from rig_identification.search.laws import in_words, sparse
 from rig_identification.search.levels import ALONE
@@ -166,6 +166,8 @@ def _alone_or_with_one_more(
         # What all residuals are noise with comes before what is found within that noise, and bends to it
         now = Standing(Rung(here, evaluation, ALONE), found)
         for child in children(problem, now, candidates, named.budget, say, promises)[:1]:
+            if child.evidence < now.evidence + MEANT:
+                continue
             say("whole runs with " + child.label)
             both = whole_runs(
                 ideal, replace(named, found=(*named.found, child.trial(child.found[-1]))), as_found=True
