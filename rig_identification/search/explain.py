@@ -103,7 +103,8 @@ def _explain(
     outcome = search(ideal, first, notify, budget, heard)
     if outcome.told is not None or watched:
         return outcome.told
-    seen(outcome.likeliest.rung)
+    rung = outcome.likeliest.rung
+    seen(outcome.first.rung if rung.alone else rung)
     found = _beside(ideal, outcome, rest_explained, notify, budget)
     if found is not None or part:
         return found

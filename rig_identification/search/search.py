@@ -44,13 +44,14 @@ class Outcome:
 
 
 def first_rung(ideal: Ideal) -> Rung | None:
-    """The ideal model at its own level; None where not even the strongest wrench follows the recordings."""
-    problem = problem_of(ideal)
-    fitted = ideal.fitted
-    if only_watched(fitted.problem):
+    """The ideal model where its search begins; None where not even the strongest wrench follows.
+
+    Far from the noise it is the model at its own level. Near the noise first order needs no wrench, and a
+    weak one would take the place of nearly anything small. A body that is only watched tells none.
+    """
+    problem, fitted = problem_of(ideal), ideal.fitted
+    if only_watched(fitted.problem) or misfit(fitted.evaluation) < NEAR_SQUARE:
         return Rung(problem, fitted.evaluation, ALONE)
-    if misfit(fitted.evaluation) < NEAR_SQUARE:
-        return climbed(Rung(problem, fitted.evaluation, ALONE))
     return begun(problem, fitted.guess or fitted.evaluation.point)
 
 
@@ -67,7 +68,7 @@ def search(
     heard: Heard = unheard,
     promises: list[Promise] | None = None,
 ) -> Outcome:
-    """What explains the session. first: the ideal model at its own level.
+    """What explains the session. first: the ideal model where the search begins.
 
     budget: how much it may compute. heard: is told what explains the session, as it is found. promises:
     about ``first``, where they are known.
@@ -78,6 +79,12 @@ def search(
     queue, idle = [start], {id(start): 0}
     likeliest, told, partly = start, None, None
     for turn in range(EXPANDED):
+        if turn == 1 and start.rung.alone and not only_watched(problem) and not budget.spent():
+            # What no number explains at first order may be a force that has no name
+            start = Standing(climbed(start.rung))
+            queue += [] if start.rung.alone else [start]
+            idle[id(start)] = 0
+            likeliest = max(likeliest, start, key=lambda s: s.evidence)
         if not queue or budget.spent():
             break
         standing = max(queue, key=lambda s: s.evidence)
