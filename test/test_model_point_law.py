@@ -15,12 +15,11 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.growing import misfit
 from rig_identification.mismatch.budget import UNLIMITED
-from rig_identification.mismatch.trial import fitted_to_its_end
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Input, Motion, RigModel, simulate
-from rig_identification.search.ladder import Rung
+from rig_identification.search.expand import Standing, children
+from rig_identification.search.ladder import begun
 from rig_identification.search.laws import promised_laws, sparse
-from rig_identification.search.levels import ALONE
 
 Array = NDArray[np.float64]
 POINT = np.array([0.3, 0.5, -0.4])
@@ -128,12 +127,13 @@ def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float,
     spec = replace(shaken(14, 12.0), effects=effects, doubts=False)
     problem, found = seen_by_the_true_body(spec, 3)
     before = misfit(found)
-    first = promised_laws(Rung(problem, found, ALONE), ())[0]
-    begun = fitted_to_its_end(problem, found, first)
-    assert begun is not None
+    first = begun(problem, replace(found.point, latents=()))
+    assert first is not None
+    law = promised_laws(first, ())[0]
+    child = children(problem, Standing(first), [], UNLIMITED, lambda label: None, [law])[0]
     # Beside a law another one is not asked for
-    assert promised_laws(Rung(begun.problem, begun.evaluation, ALONE), (begun.candidate,)) == []
-    (trial,) = sparse(problem, [begun], UNLIMITED)
+    assert promised_laws(child.rung, child.found) == []
+    (trial,) = sparse(problem, [child.trial(law.candidate)], UNLIMITED)
     assert before > 1.5
     assert misfit(trial.evaluation) < 1.03
     told = trial.candidate.told(estimates(trial.problem, trial.evaluation))

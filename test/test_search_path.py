@@ -122,7 +122,7 @@ def test_near_the_noise_a_wrench_is_asked_for_only_where_something_is_left(
     spec = replace(shaken(10, 10.0), effects={"hinge_damping": (damping,)} if damping else {}, doubts=False)
     fitted = fit_session(simulate_session(spec, np.random.default_rng(5))[0])
     assert near_noise(fitted)
-    rung = climbed(fitted.problem, fitted.evaluation)
+    rung = climbed(Rung(fitted.problem, fitted.evaluation, ALONE))
     assert rung.alone is alone
     if alone:
         assert rung.evaluation is fitted.evaluation

@@ -139,7 +139,7 @@ def test_no_model_has_more_than_three_effects_and_no_more_than_four_are_expanded
 
 
 def test_what_gains_no_more_than_chance_gives_is_no_child(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, expanded, whole = searched(monkeypatch, {"": [("a", queue.NEEDED, ALONE)]}, ("a",))
+    found, expanded, whole = searched(monkeypatch, {"": [("a", queue.MEANT, ALONE)]}, ("a",))
     assert (expanded, whole) == ([""], [])
     assert found.likeliest is found.first
     assert found.partly is None
@@ -243,6 +243,9 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(expand, "contradicted", lambda trial: trial.candidate.effect == "clock")
     monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, level))
     monkeypatch.setattr(expand, "_closer", lambda *_: [])
+    monkeypatch.setattr(expand, "_giving_way", lambda *_: [])
+    monkeypatch.setattr(expand, "_clocks_and_lags", lambda ranked: ranked)
+    monkeypatch.setattr(expand, "_last_of", lambda child: SimpleNamespace(candidate=child.found[-1]))
     monkeypatch.setattr(expand, "_makes_sense", lambda standing, ordinary: True)
     monkeypatch.setattr(expand, "ordinary_errors", lambda problem: {})
     monkeypatch.setattr(expand, "_earned", lambda before, after: after)

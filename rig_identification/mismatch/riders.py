@@ -21,7 +21,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.candidate import Candidate, Told
-from rig_identification.mismatch.supports import ceiling_candidate
+from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel
@@ -76,15 +76,23 @@ def pieces_of(problem: Problem) -> dict[str, list[int]]:
     return {name: sorted(which, key=lambda i: problem.runs[i].offset) for name, which in groups.items()}
 
 
-def _ceiling_like(problem: Problem, swing: Swing, mass: float) -> tuple[Candidate, dict[str, float]]:
-    """A ceiling that rings with the body at the frequency of a part on springs, and where its fit starts.
+def _ringing_like(
+    problem: Problem, swing: Swing, mass: float
+) -> tuple[tuple[Candidate, dict[str, float]], ...]:
+    """What rings with the body at the frequency of a part on springs, and where its fit starts.
 
-    A light one has a compliance of 1/(m w^2) under the body's mass m. mass: kg, of the body.
+    A light ceiling has a compliance c = 1/(m w^2) under the body's mass m; n cables of length L that bounce
+    so have E A = L/(n c). mass: kg, of the body.
     """
-    axis = AXES.index(swing.directions)
-    ceiling = ceiling_candidate(problem.bench.rig, problem.bench.parameters.model, mass, axis)
+    rig, model = problem.bench.rig, problem.bench.parameters.model
+    ceiling = ceiling_candidate(rig, model, mass, AXES.index(swing.directions))
     compliance = 1.0 / (mass * (2.0 * np.pi * swing.frequency) ** 2)
-    return ceiling, {f"ceiling.compliance.{swing.directions}": compliance}
+    sinking = (ceiling, {f"ceiling.compliance.{swing.directions}": compliance})
+    if swing.directions != "z":
+        return (sinking,)
+    length = float(np.mean([c.length for c in rig.cables]))
+    stretching = cable_elasticity(rig, model, mass)
+    return sinking, (stretching, {"cable.axial_stiffness": length / (model.cables * compliance)})
 
 
 def rider_candidate(
@@ -159,7 +167,7 @@ def rider_candidate(
         positive=1,
         tell=told,
         build=build,
-        twins=() if len(axes) > 1 else (_ceiling_like(problem, swing, mass),),
+        twins=() if len(axes) > 1 else _ringing_like(problem, swing, mass),
     )
     values = {f"{effect}.mass": found}
     values |= {f"{effect}.position.{a}": float(at[i]) for i, a in enumerate(AXES)}

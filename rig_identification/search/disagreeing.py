@@ -16,7 +16,7 @@ import numpy as np
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal
-from rig_identification.estimate.solve import Evaluation, excess, solve
+from rig_identification.estimate.solve import solve
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
@@ -24,16 +24,13 @@ from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.whole_runs import Named, whole_runs
-from rig_identification.search.expand import Standing, children
+from rig_identification.search.expand import Standing, children, shows
 from rig_identification.search.ladder import Rung
 from rig_identification.search.laws import in_words, sparse
 from rig_identification.search.levels import ALONE
 from rig_identification.search.search import problem_of
 
 Notify = Callable[[str, float], None]
-
-#: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
-SEEN = 4.0
 
 
 def where_runs_disagree(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
@@ -70,12 +67,6 @@ def _rivals(told: Standing, every: list[Standing]) -> tuple[dict[str, object], .
     """What trails the one that is told, as entries of ``alternatives``."""
     others = [s for s in every if s is not told and s.evidence <= told.evidence]
     return tuple(rival(s.trial(s.found[-1]), told.evidence - s.evidence) for s in others)
-
-
-def shows(evaluation: Evaluation) -> bool:
-    """Whether the residuals as a whole show that something is left."""
-    size = sum(run.residual.size for run in evaluation.runs)
-    return bool(excess(evaluation) >= SEEN * np.sqrt(0.5 * size))
 
 
 def _together(fitted: Fitted) -> Rung | None:

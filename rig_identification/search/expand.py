@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.estimate.identify import ORDINARY
-from rig_identification.estimate.solve import Point, Problem
+from rig_identification.estimate.solve import Evaluation, Point, Problem, excess
+from rig_identification.mismatch.amounts import supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, net_gain
@@ -42,6 +43,9 @@ FITTED, ALIKE, WALKED = 5, 2, 3
 SHARE = 0.1
 #: Share of the evidence that another one has gained already: first order is right within a factor of two.
 REACHED = 0.5
+#: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole, and the
+#: share of that which counts as the larger part.
+SEEN, CHIEF = 4.0, 0.5
 #: Log evidence by which a hypothesis trails at the same level (odds of 1 to 20,000) that is no rival.
 RIVAL = 10.0
 #: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
@@ -95,12 +99,14 @@ def children(
         promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
         promises += promised_laws(rung, standing.found)
     first = _first_fits(standing, worthy(promises, count_of(candidates)), budget, say)
+    first += _giving_way(standing, first, budget, say)
     first += _alike(standing, first, left, budget, say)
     first = [child for child in first if not contradicted(_last_of(child))]
     first.sort(key=lambda child: -child.rung.within_reach)
     walked: list[Standing] = []
-    for child in first[:WALKED]:
+    for k, child in enumerate(first[:WALKED]):
         if walked and budget.spent():
+            budget.leave(c.found[-1].label for c in first[k:WALKED])
             break
         explains = [w.found[-1].kind for w in walked if w.rung.alone]
         if explains and child.rung.within_reach < first[0].rung.evidence - RIVAL:
@@ -155,6 +161,28 @@ def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say
             first.append(child)
             gained = max(gained, child.rung.evidence - standing.rung.evidence)
     return first
+
+
+def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: Say) -> list[Standing]:
+    """First fits of what gives way, of which first order says nothing where it rings.
+
+    With a wrench in the model what rings is told by its forces. Without one it is scanned by its amount,
+    where the residuals as a whole show something, and nothing that was fitted takes the larger part away.
+    """
+    rung = standing.rung
+    before = rung.evaluation
+    taken = any(excess(child.rung.evaluation) < CHIEF * excess(before) for child in first)
+    if not rung.alone or taken or not shows(before) or budget.spent():
+        return []
+    say("what gives way")
+    promises = supports(rung.problem, before, mass_of(rung.problem, before), budget)
+    return _first_fits(standing, worthy(promises, len(promises)), budget, say)
+
+
+def shows(evaluation: Evaluation) -> bool:
+    """Whether the residuals as a whole show that something is left."""
+    size = sum(run.residual.size for run in evaluation.runs)
+    return bool(excess(evaluation) >= SEEN * np.sqrt(0.5 * size))
 
 
 def _begun_best(standing: Standing, promise: Promise, budget: Budget, say: Say) -> Standing | None:
@@ -271,6 +299,7 @@ def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> I
         parent = replace(extended(problem, others), discrepancy=rung.problem.discrepancy)
         for closer, values in asked(rung.problem, rung.evaluation):
             if budget.spent():
+                budget.leave([closer.label])
                 return
             say(closer.label)
             wide, point = _entered(rung, parent, _without(problem, standing, k), closer, values)

@@ -85,9 +85,12 @@ def search(
             queue += [] if start.rung.alone else [start]
             idle[id(start)] = 0
             likeliest = max(likeliest, start, key=lambda s: s.evidence)
-        if not queue or budget.spent():
+        if not queue:
             break
         standing = max(queue, key=lambda s: s.evidence)
+        if budget.spent():
+            budget.leave(["one more effect" + (f" beside {standing.label}" if standing.found else "")])
+            break
         queue.remove(standing)
 
         def say(label: str, turn: int = turn) -> None:
