@@ -196,8 +196,11 @@ def test_what_is_fitted_soon_comes_before_a_hose_and_may_spare_its_fit(
 ) -> None:
     promises = [promise("hose", 150.0, MANY), promise("mass", 100.0)]
     assert begun_of(monkeypatch, promises, {"mass": 80.0, "hose": 150.0}, UNLIMITED) == ["mass", "hose"]
-    less = [promise("hose", 90.0, MANY), promise("mass", 100.0)]
-    assert begun_of(monkeypatch, less, {"mass": 200.0, "hose": 150.0}, UNLIMITED) == ["mass"]
+    less = [promise("hose", 45.0, MANY), promise("mass", 100.0)]
+    assert begun_of(monkeypatch, less, {"mass": 100.0, "hose": 150.0}, UNLIMITED) == ["mass"]
+    # What gains more than it promised says that first order tells little: it spares no more than that
+    more = [promise("hose", 90.0, MANY), promise("mass", 100.0)]
+    assert begun_of(monkeypatch, more, {"mass": 500.0, "hose": 150.0}, UNLIMITED) == ["mass", "hose"]
 
 
 def test_what_time_was_short_of_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -67,8 +67,9 @@ def stretching(rig: Rig, model: RigModel, mass: float) -> tuple[RigModel, tuple[
     )
     damping = 2.0 * DAMPING / (2.0 * np.pi * BOUNCE)
     return elastic, (
-        # Beyond a twentieth and twenty times nothing tells it from rigid, and each step takes minutes
-        shared(STIFFNESS, "N", usual_stiffness(rig, mass), 1.0, layout.AXIAL_STIFFNESS, bounded=True),
+        # Within three std: from 0.014 times what is usual, webbing on which a car sinks by decimetres, to
+        # eighteen times, beyond which nothing tells it from rigid and each step takes minutes
+        shared(STIFFNESS, "N", 0.5 * usual_stiffness(rig, mass), 1.2, layout.AXIAL_STIFFNESS, bounded=True),
         shared(TIME_CONSTANT, "s", damping, 1.0, layout.AXIAL_DAMPING),
     )
 

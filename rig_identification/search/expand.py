@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import ORDINARY
 from rig_identification.estimate.solve import Evaluation, Point, Problem, excess
+from rig_identification.estimate.stretching import STIFFNESS, usual_stiffness
 from rig_identification.mismatch.amounts import supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
@@ -20,6 +22,7 @@ from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.same_clock import contradicted
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.supports import cable_elasticity, gives_way
 from rig_identification.mismatch.trial import (
     Trial,
     attempt,
@@ -41,7 +44,7 @@ Say = Callable[[str], None]
 FITTED, ALIKE, WALKED = 5, 2, 3
 #: Share of the best promise that another one has to come to.
 SHARE = 0.1
-#: Share of the evidence that another one has gained already: first order is right within a factor of two.
+#: Share of what another one has promised and gained: first order is right within a factor of two.
 REACHED = 0.5
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole, and the
 #: share of that which counts as the larger part.
@@ -50,6 +53,8 @@ SEEN, CHIEF = 4.0, 0.5
 RIVAL = 10.0
 #: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
 MEANT = 3.0
+#: Parts of the usual stiffness at which cables that stretch are begun: webbing, rope, wire.
+STRETCHES = (0.03, 0.3, 3.0)
 #: Steps of the first fit of each. What a further step promises is counted: with four steps the same were the
 #: best, at a fourth more work (sessions of bench/concealed, labs).
 FIRST_STEPS = 2
@@ -149,34 +154,52 @@ def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say
     """First fits of promises, what is fitted soon before what is fitted in ten times the time."""
     asked = list(_with_twins(sorted(promises, key=lambda p: p.candidate.slow)))
     first: list[Standing] = []
-    gained = 0.0
+    kept = 0.0
     for k, promise in enumerate(asked):
         if budget.spent():
             budget.leave(p.candidate.label for p in asked[k:])
             break
-        if promise.gain < REACHED * gained:
+        if promise.gain < REACHED * kept:
             continue
         child = _begun_best(standing, promise, budget, say)
         if child is not None:
             first.append(child)
-            gained = max(gained, child.rung.evidence - standing.rung.evidence)
+            # What gains more than it promised says that first order says little of the others too
+            kept = max(kept, min(promise.gain, child.rung.evidence - standing.rung.evidence))
     return first
 
 
 def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: Say) -> list[Standing]:
     """First fits of what gives way, of which first order says nothing where it rings.
 
-    With a wrench in the model what rings is told by its forces. Without one it is scanned by its amount,
-    where the residuals as a whole show something, and nothing that was fitted takes the larger part away.
+    Without a wrench in the model it is scanned by its amount, where the residuals as a whole show something
+    and nothing that was fitted takes the larger part away. With a wrench what rings is told by its forces.
+    But cables that stretch move the body where no force could, and are begun at a few stiffnesses where the
+    wrench does not account for what is measured.
     """
     rung = standing.rung
     before = rung.evaluation
+    if not rung.alone:
+        return _stretching(standing, budget, say) if misfit(before) > NEAR_SQUARE else []
     taken = any(excess(child.rung.evaluation) < CHIEF * excess(before) for child in first)
-    if not rung.alone or taken or not shows(before) or budget.spent():
+    if taken or not shows(before) or budget.spent():
         return []
     say("what gives way")
     promises = supports(rung.problem, before, mass_of(rung.problem, before), budget)
     return _first_fits(standing, worthy(promises, len(promises)), budget, say)
+
+
+def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
+    """The best first fit of cables that stretch, over the stiffnesses that wire and rope have."""
+    rung = standing.rung
+    rig, model = rung.problem.bench.rig, rung.problem.bench.parameters.model
+    if gives_way(model):
+        return []
+    mass = mass_of(rung.problem, rung.evaluation)
+    candidate, usual = cable_elasticity(rig, model, mass), usual_stiffness(rig, mass)
+    starts = [Promise(candidate, 0.0, {STIFFNESS: share * usual}) for share in STRETCHES]
+    found = [_begun(standing, start, budget, say) for start in starts if not budget.spent()]
+    return sorted((f for f in found if f is not None), key=lambda f: -f.rung.within_reach)[:1]
 
 
 def shows(evaluation: Evaluation) -> bool:
