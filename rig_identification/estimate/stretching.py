@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.parameters import Parameter
+from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.rest_evidence import RestEvidence, coarsened, prepare_rest
 from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
@@ -126,11 +126,14 @@ def _means_of_runs(problem: Problem) -> tuple[RestEvidence, ...]:
 
 def _softest(soft: Stretched, rests: tuple[RestEvidence, ...]) -> Evaluation | None:
     """The best fit to rest of all stiffnesses that are tried first; None where there is none."""
-    index = soft.problem.bench.parameters.index_of(STIFFNESS)
+    parameters = soft.problem.bench.parameters
+    index = parameters.index_of(STIFFNESS)
+    own = parameters.free[index - INERTIAL]
+    usual = usual_stiffness(soft.problem.bench.rig, float(parameters.elements(soft.theta)[0]))
     best: Evaluation | None = None
     for share in STIFFNESSES:
         theta = soft.theta.copy()
-        theta[index] = np.log(share)
+        theta[index] = own.position(share * usual)
         found = _at_rest(soft.problem, theta, rests)
         if found is not None and (best is None or found.cost < best.cost):
             best = found

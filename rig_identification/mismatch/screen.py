@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
+from rig_identification.estimate.stretching import STIFFNESS
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.boxed import Boxed, probed_of
 from rig_identification.mismatch.candidate import Candidate
@@ -42,6 +43,7 @@ from rig_identification.mismatch.supports import (
     ceiling_candidate,
     gives_way,
     largest_compliance,
+    stiffnesses,
 )
 from rig_identification.mismatch.tethers import placed_tethers
 from rig_identification.model.motion import State
@@ -202,7 +204,9 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
         length = float(np.mean([c.length for c in rig.cables]))
         stiffness = length / (compliance * model.cables)
         elasticity = cable_elasticity(rig, model, mass)
-        out.append(Promise(elasticity, probe.gain, {"cable.axial_stiffness": stiffness}))
+        # A ceiling's probe says how much they yield where all carry alike
+        also = tuple(Promise(elasticity, probe.gain, {STIFFNESS: s}) for s in stiffnesses(rig, mass))
+        out.append(Promise(elasticity, probe.gain, {STIFFNESS: stiffness}, elsewhere=also))
     return out
 
 

@@ -16,7 +16,13 @@ from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem
-from rig_identification.estimate.stretching import DAMPING, STIFFNESS, TIME_CONSTANT, stretching
+from rig_identification.estimate.stretching import (
+    DAMPING,
+    STIFFNESS,
+    TIME_CONSTANT,
+    stretching,
+    usual_stiffness,
+)
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -29,6 +35,9 @@ Array = NDArray[np.float64]
 CEILING_FREQUENCY = 10.0
 #: Damping ratio of a probe: it starts unloaded, and what that costs is over after a twentieth of a second.
 PROBE_DAMPING = 1.0
+
+#: Parts of the usual stiffness at which cables that stretch are begun: webbing, rope, wire.
+STRETCHES = (0.03, 0.3, 3.0)
 
 
 def gives_way(model: RigModel) -> bool:
@@ -112,6 +121,11 @@ def ceiling_candidate(
         tell=told,
         build=build,
     )
+
+
+def stiffnesses(rig: Rig, mass: float) -> list[float]:
+    """(3,) EA, N, at which a fit of cables that stretch is begun: none finds its way from one to the next."""
+    return [share * usual_stiffness(rig, mass) for share in STRETCHES]
 
 
 def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:

@@ -13,7 +13,7 @@ import numpy as np
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import ORDINARY
 from rig_identification.estimate.solve import Evaluation, Point, Problem, excess
-from rig_identification.estimate.stretching import STIFFNESS, usual_stiffness
+from rig_identification.estimate.stretching import STIFFNESS
 from rig_identification.mismatch.amounts import supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
@@ -22,7 +22,7 @@ from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.same_clock import contradicted
 from rig_identification.mismatch.screen import Promise, carried, extended, screen
-from rig_identification.mismatch.supports import cable_elasticity, gives_way
+from rig_identification.mismatch.supports import cable_elasticity, gives_way, stiffnesses
 from rig_identification.mismatch.trial import (
     Trial,
     attempt,
@@ -53,8 +53,6 @@ SEEN, CHIEF = 4.0, 0.5
 RIVAL = 10.0
 #: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
 MEANT = 3.0
-#: Parts of the usual stiffness at which cables that stretch are begun: webbing, rope, wire.
-STRETCHES = (0.03, 0.3, 3.0)
 #: Steps of the first fit of each. What a further step promises is counted: with four steps the same were the
 #: best, at a fourth more work (sessions of bench/concealed, labs).
 FIRST_STEPS = 2
@@ -196,8 +194,8 @@ def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
     if gives_way(model):
         return []
     mass = mass_of(rung.problem, rung.evaluation)
-    candidate, usual = cable_elasticity(rig, model, mass), usual_stiffness(rig, mass)
-    starts = [Promise(candidate, 0.0, {STIFFNESS: share * usual}) for share in STRETCHES]
+    candidate = cable_elasticity(rig, model, mass)
+    starts = [Promise(candidate, 0.0, {STIFFNESS: amount}) for amount in stiffnesses(rig, mass)]
     found = [_begun(standing, start, budget, say) for start in starts if not budget.spent()]
     return sorted((f for f in found if f is not None), key=lambda f: -f.rung.within_reach)[:1]
 
@@ -279,7 +277,7 @@ def _with_twins(promises: list[Promise]) -> Iterator[Promise]:
     for promise in promises:
         yield promise
         for candidate, values in promise.candidate.twins:
-            yield replace(promise, candidate=candidate, values=values)
+            yield replace(promise, candidate=candidate, values=values, elsewhere=())
 
 
 def worthy(promises: list[Promise], count: int) -> list[Promise]:
