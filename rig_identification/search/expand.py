@@ -33,7 +33,7 @@ from rig_identification.mismatch.trial import (
     promised,
 )
 from rig_identification.model.motion import State
-from rig_identification.search.ladder import Rung, fitted_at, walked_down
+from rig_identification.search.ladder import STAYING, Rung, fitted_at, walked_down
 from rig_identification.search.laws import promised_laws
 from rig_identification.search.path import beside
 
@@ -157,13 +157,16 @@ def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say
         if budget.spent():
             budget.leave(p.candidate.label for p in asked[k:])
             break
-        if promise.gain < REACHED * kept:
+        if standing.rung.alone and promise.gain < REACHED * kept:
+            # Beside a wrench first order is no bound: the wrench gives way by more than that
             continue
         child = _begun_best(standing, promise, budget, say)
         if child is not None:
             first.append(child)
-            # What gains more than it promised says that first order says little of the others too
-            kept = max(kept, min(promise.gain, child.rung.evidence - standing.rung.evidence))
+            gained = child.rung.evidence - standing.rung.evidence
+            if gained < promise.gain / REACHED:
+                # Where one gains much more than it promised first order says little of the others too
+                kept = max(kept, min(promise.gain, gained))
     return first
 
 
@@ -324,7 +327,9 @@ def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> I
                 return
             say(closer.label)
             wide, point = _entered(rung, parent, _without(problem, standing, k), closer, values)
-            down = walked_down(wide, point, rung.level)
+            # It starts from another description's numbers, and has to find its own before it is walked down
+            begun = fitted_at(wide, point, rung.level, STAYING)
+            down = None if begun is None else walked_down(wide, begun.evaluation.point, rung.level)
             if down is not None:
                 yield Standing(down, (*others, closer))
 

@@ -104,8 +104,10 @@ def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
     if best is None:
         return None
     alone = _alone_at_once(best)
-    if alone is not None:
-        return climbed(alone)
+    leapt = None if alone is None else climbed(alone)
+    if leapt is not None and leapt.alone:
+        return leapt
+    # Where it leaves something after all the leap may have led into another valley
     while best.level < ALONE:
         weaker = fitted_at(problem, best.evaluation.point, best.level + 1, PASSING)
         if weaker is not None and weaker.evidence < best.evidence:
@@ -114,7 +116,7 @@ def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
         if weaker is None or weaker.evidence < best.evidence:
             break
         best = weaker
-    return best
+    return best if leapt is None or best.evidence > leapt.evidence else leapt
 
 
 def _alone_at_once(rung: Rung) -> Rung | None:
