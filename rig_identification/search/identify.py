@@ -175,7 +175,8 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
             found = explain(ideal, spells_of(ideal.fitted), searching, budget, so_far.hear, so_far.see)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
-    if swinging is not None and (found is None or not (found.told or found.mismatch.verdict == "none")):
+    if swinging is not None and (found is None or not (found.wholly or found.mismatch.verdict == "none")):
+        # What damps a swing is no trace: it gives way only to what leaves none
         return swinging
     if found is None:
         ideal = so_far.ideal = with_pieces(ideal, searching)
