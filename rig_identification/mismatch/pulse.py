@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.side_by_side import side_by_side
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import pushed
 from rig_identification.mismatch.response import whitened_response
@@ -100,15 +100,18 @@ def _gain(shot: _Shot | None) -> float:
     return 0.0 if shot is None else shot.gain
 
 
+def all_runs(fitted: Fitted) -> tuple[Problem, Point]:
+    """All runs that can be followed, fitted or held out, as one problem, and where the fit has it."""
+    problem = replace(fitted.problem, runs=(*fitted.problem.runs, *fitted.holdout_runs))
+    starts = (*fitted.evaluation.point.starts, *(held.motion.state(0) for held in fitted.holdouts))
+    point = replace(fitted.evaluation.point, starts=starts, latents=())
+    return with_reference(problem, fitted.rest), point
+
+
 def _everything(fitted: Fitted) -> tuple[Problem, Evaluation] | None:
     """All whole runs, fitted or held out, linearised about the fit."""
-    held = fitted.holdout_runs
-    problem = with_reference(replace(fitted.problem, runs=(*fitted.problem.runs, *held)), fitted.rest)
-    starts = (
-        *fitted.evaluation.point.starts,
-        *(linearised.motion.state(0) for linearised in fitted.holdouts),
-    )
-    evaluation = evaluate(problem, replace(fitted.evaluation.point, starts=starts, latents=()))
+    problem, point = all_runs(fitted)
+    evaluation = evaluate(problem, point)
     return None if evaluation is None else (problem, evaluation)
 
 

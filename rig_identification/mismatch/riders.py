@@ -20,8 +20,9 @@ from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.stretching import STIFFNESS
 from rig_identification.mismatch.candidate import Candidate, Told
-from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate
+from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, yielding_like
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel
@@ -90,9 +91,8 @@ def _ringing_like(
     sinking = (ceiling, {f"ceiling.compliance.{swing.directions}": compliance})
     if swing.directions != "z":
         return (sinking,)
-    length = float(np.mean([c.length for c in rig.cables]))
     stretching = cable_elasticity(rig, model, mass)
-    return sinking, (stretching, {"cable.axial_stiffness": length / (model.cables * compliance)})
+    return sinking, (stretching, {STIFFNESS: yielding_like(rig, model, compliance)})
 
 
 def rider_candidate(

@@ -44,6 +44,7 @@ from rig_identification.mismatch.supports import (
     gives_way,
     largest_compliance,
     stiffnesses,
+    yielding_like,
 )
 from rig_identification.mismatch.tethers import placed_tethers
 from rig_identification.model.motion import State
@@ -201,8 +202,7 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
     axis = "xyz".index(name[-1])
     out = [Promise(ceiling_candidate(rig, model, mass, axis), probe.gain, probe.values)]
     if axis == 2:
-        length = float(np.mean([c.length for c in rig.cables]))
-        stiffness = length / (compliance * model.cables)
+        stiffness = yielding_like(rig, model, compliance)
         elasticity = cable_elasticity(rig, model, mass)
         # A ceiling's probe says how much they yield where all carry alike
         also = tuple(Promise(elasticity, probe.gain, {STIFFNESS: s}) for s in stiffnesses(rig, mass))

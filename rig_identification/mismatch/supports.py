@@ -123,6 +123,12 @@ def ceiling_candidate(
     )
 
 
+def yielding_like(rig: Rig, model: RigModel, compliance: float) -> float:
+    """EA, N, of cables side by side that yield as a ceiling of so much compliance (m/N) does."""
+    length = float(np.mean([c.length for c in rig.cables]))
+    return length / (compliance * model.cables)
+
+
 def stiffnesses(rig: Rig, mass: float) -> list[float]:
     """(3,) EA, N, at which a fit of cables that stretch is begun: none finds its way from one to the next."""
     return [share * usual_stiffness(rig, mass) for share in STRETCHES]

@@ -22,7 +22,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.pulse import all_runs
 from rig_identification.mismatch.whole_runs import Named, whole_runs
 from rig_identification.search.expand import Standing, children, shows
 from rig_identification.search.ladder import Rung
@@ -71,12 +71,9 @@ def _rivals(told: Standing, every: list[Standing]) -> tuple[dict[str, object], .
 
 def _together(fitted: Fitted) -> Rung | None:
     """The ideal model fitted to all runs that can be followed; None where it cannot be."""
-    problem = with_reference(fitted.problem, fitted.rest)
-    problem = replace(problem, runs=(*problem.runs, *fitted.holdout_runs))
-    point = fitted.evaluation.point
-    starts = (*point.starts, *(held.motion.state(0) for held in fitted.holdouts))
+    problem, point = all_runs(fitted)
     try:
-        evaluation, converged = solve(problem, replace(point, starts=starts))
+        evaluation, converged = solve(problem, point)
     except FloatingPointError:
         return None
     return Rung(problem, evaluation, ALONE) if converged else None
