@@ -95,12 +95,16 @@ class Evidence:
         if start is None or start.rest is None:
             moved = bool(hypothesis.about & MOVING) or hypothesis.change.rig is not None
             spared = most - self._beside_rest(hypothesis.about)
-            return self._account(changed, hypothesis.loosened, self.plain, moved, spared)
+            account = self._account(changed, hypothesis.loosened, self.plain, moved, spared)
+            possible = account.rest is not None and hypothesis.possible(account.rest)
+            return account if possible else Account(None, (), float("inf"), {})
         devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
         if hypothesis.about == {"imu.gyroscope"}:
             rest = self.plain.rest or start.rest
         else:
             rest = joined(start.rest, changed.rig, changed.at_rest, devices, hypothesis.loosened)
+        if not hypothesis.possible(rest):
+            return Account(None, (), float("inf"), {})
         parts = {"rest": self._rest_nats(rest.square)}
         for k, run in enumerate(changed.runs[:RUNS]):
             motion = start.motions[k]

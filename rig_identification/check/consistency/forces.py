@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 GYRATION, GUESSED = 0.35, 1.0
 #: Std of the centre of mass beyond what rest tells, share of the hinges' span.
 CENTER = 0.02
-#: A cell gives at least this share of the force that it measures: less is no gain, it is another cell.
+#: A cell gives at least this share of the force that it measures: less is no gain (:mod:`faults.gain`).
 LEAST = 0.1
 
 

@@ -115,6 +115,8 @@ class Hypothesis:
     loosened: Loosened = field(default_factory=Loosened)
     #: What remains to be changed once the fit is known (zeros of cells, the known mass), or None.
     fitted: Callable[[RestFit], Change] | None = None
+    #: Whether the fault may have the numbers that the fit gives it.
+    possible: Callable[[RestFit], bool] = lambda rest: True
     free: int = 0  # numbers that the hypothesis fits
     penalty: float = 0.0  # nats that speak against it before any reading is looked at
     fresh: bool = False  # no first-order evaluation: the description itself changes

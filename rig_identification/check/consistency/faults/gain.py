@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.forces import LEAST
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import Loosened
@@ -14,7 +15,7 @@ from rig_identification.quantity import with_interval
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """Every cell, and every pair of cells."""
+    """Every cell, and every pair of cells. A gain below nothing is a wire's fault, and near it another cell's."""
     names = tuple(c.name for c in evidence.session.rig.cables)
     for name in names:
         yield _gains((name,), names)
@@ -45,9 +46,12 @@ def _gains(cells: tuple[str, ...], names: tuple[str, ...]) -> Hypothesis:
             "Compare the calibration numbers in the amplifier with each cell's certificate.",
         )
 
+    def possible(rest: RestFit) -> bool:
+        return all(gain > LEAST - 1.0 for gain, _ in gains(rest).values())
+
     return Hypothesis(
         Change(), describe, frozenset(names), variants=len(names) * (len(names) + 1) // 2,
-        loosened=Loosened(gains=cells), fitted=fitted, free=len(cells),
+        loosened=Loosened(gains=cells), fitted=fitted, possible=possible, free=len(cells),
     )  # fmt: skip
 
 

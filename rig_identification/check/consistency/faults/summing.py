@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
+from collections.abc import Iterator, Mapping
 
 from rig_identification.check.consistency.evidence import Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
@@ -20,19 +18,21 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
         if len(held) == len(names):
             yield _sum(name, names, None)
         elif held == [name]:
-            yield _sum(name, names, _share(evidence, name))
+            yield _sum(name, names, _shares(evidence, name))
 
 
-def _share(evidence: Evidence, cell: str) -> float:
-    """Share of the sum that the cell itself should carry at rest."""
-    rest = evidence.without(frozenset(c.name for c in evidence.session.rig.cables)).rest
+def _shares(evidence: Evidence, cell: str) -> dict[str, float]:
+    """Shares of the sum that the cell itself should carry, by recording: a known mass shifts the load."""
+    rest = evidence.without(evidence.cells).rest
     if rest is None:
-        return 1.0 / len(evidence.session.rig.cables)
+        return {}
     place = [c.name for c in evidence.session.rig.cables].index(cell)
-    return float(rest.tension[0, place] / np.sum(rest.tension[0]))
+    part = rest.tension[:, place] / rest.tension.sum(axis=1)
+    return {r.name: float(p) for r, p in zip(evidence.session.at_rest, part, strict=True)}
 
 
-def _sum(cell: str, names: tuple[str, ...], share: float | None) -> Hypothesis:
+def _sum(cell: str, names: tuple[str, ...], shares: Mapping[str, float] | None) -> Hypothesis:
+    """shares: of the sum that are the cell's own, where no other cell tells them."""
     def describe(rest: RestFit | None) -> SetupFault:
         return fault(
             "wiring",
@@ -40,12 +40,13 @@ def _sum(cell: str, names: tuple[str, ...], share: float | None) -> Hypothesis:
             {},
             f"The channel of {cell} carries the sum of all cells.",
             "Wire each cell to its own amplifier, not through the summing box."
-            + ("" if share is None else " Until then the channel is left out."),
-            corrected=share is None,
+            + ("" if shares is None else " Until then the channel is left out."),
+            corrected=shares is None,
         )
 
-    if share is not None:
-        alone = Change({cell: lambda values, _: share * values})
+    if shares is not None:
+        even = 1.0 / len(names)
+        alone = Change({cell: lambda values, recording: shares.get(recording, even) * values})
         out = Change(left_out=(cell,))
         return Hypothesis(alone, describe, frozenset(names), fitted=lambda rest: out)
     others = tuple(name for name in names if name != cell)
