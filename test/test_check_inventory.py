@@ -13,6 +13,7 @@ from session_samples import CABLES, START_NS, make_rig
 from rig_identification.check.examine import examine
 from rig_identification.check.inventory import inventory, offsets, span_of
 from rig_identification.check.left_aside import left_aside
+from rig_identification.check.order import out_of_order
 from rig_identification.examination import TopicAccount
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 from rig_identification.rig import Rig
@@ -27,6 +28,7 @@ SENT = {
     "mocap/pose": ("mocap", "geometry_msgs/msg/PoseStamped", 7, 50.0),
 }
 LATENCY = 2_000_000  # ns
+DEVICES = tuple(topic.partition("/")[0] for topic in SENT)
 
 
 def channel(name: str, seconds: float = 10.0, late: float = 0.0) -> RawChannel:
@@ -233,3 +235,18 @@ def test_the_examination_holds_the_inventory() -> None:
     assert [account.topic for account in found.topics] == list(one.listed)
     assert any("no bag holds a message of /rig/imu/data_raw" in warning for warning in found.warnings)
     assert found.notes[:2] == ("a proposal", "the index was missing")
+
+
+@pytest.mark.parametrize(("first", "second", "warned"), [(100.0, 0.0, True), (0.0, 100.0, False)])
+def test_runs_whose_numbers_contradict_their_dates_are_told(
+    first: float, second: float, warned: bool
+) -> None:
+    clocks = [dict.fromkeys(DEVICES, late) for late in (first, second)]
+    runs = [recording(f"run_{k + 1}", "dynamic", (), **late) for k, late in enumerate(clocks)]
+    said = list(out_of_order(RawSession("van", make_rig(), tuple(runs))))
+    assert ["run_1 was recorded after run_2" in line for line in said] == [True] * warned
+
+
+def test_runs_side_by_side_in_time_are_in_order() -> None:
+    both = RawSession("van", make_rig(), (recording("run_1"), recording("run_2")))
+    assert list(out_of_order(both)) == []

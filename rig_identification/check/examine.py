@@ -14,6 +14,7 @@ from rig_identification.check.consistency.rest_readings import readings_at_rest
 from rig_identification.check.found import examiners
 from rig_identification.check.inventory import inventory
 from rig_identification.check.left_aside import left_aside
+from rig_identification.check.order import out_of_order
 from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
 
@@ -46,4 +47,5 @@ def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> E
     topics = inventory(raw, session)
     aside = left_aside(raw, session, topics)
     notes = (*raw.notes, *(note for recording in raw.recordings for note in recording.notes), *aside.notes)
-    return Examined(Examination(raw.name, topics, rest, tuple(faults), aside.warnings, notes), session)
+    warnings = (*aside.warnings, *out_of_order(raw))
+    return Examined(Examination(raw.name, topics, rest, tuple(faults), warnings, notes), session)

@@ -15,7 +15,7 @@ from rig_identification.quantity import with_interval
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """Every cell, and every pair of cells. A gain below nothing is a wire's fault, and near it another cell's."""
+    """Every cell, and every pair of cells. A negative gain is a wire's fault."""
     names = tuple(c.name for c in evidence.session.rig.cables)
     for name in names:
         yield _gains((name,), names)

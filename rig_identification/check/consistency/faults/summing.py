@@ -33,6 +33,7 @@ def _shares(evidence: Evidence, cell: str) -> dict[str, float]:
 
 def _sum(cell: str, names: tuple[str, ...], shares: Mapping[str, float] | None) -> Hypothesis:
     """shares: of the sum that are the cell's own, where no other cell tells them."""
+
     def describe(rest: RestFit | None) -> SetupFault:
         return fault(
             "wiring",
