@@ -114,6 +114,20 @@ class Evidence:
             parts |= _parts(changed.rig, run, self._body(start), motion, rest)
         return Account(start.rest, start.motions, float(sum(parts.values())), parts)
 
+    def plain_beside(self, other: Account) -> float:
+        """Nats of the session as it is once the motion of another account may be its own as well.
+
+        Readings that are hardly more than noise leave the motion open, and forces tell such motions apart: what
+        a hypothesis gains by its motion alone is no gain.
+        """
+        if self.plain.rest is None or not other.motions:
+            return self.plain.cost
+        cost = self.plain.parts["rest"]
+        for run, motion in zip(self.session.runs[:RUNS], other.motions, strict=False):
+            begun = _best_motion(self.session.rig, run, self.plain.rest, motion, moved=False)[1]
+            cost += sum(begun.values())
+        return min(self.plain.cost, cost)
+
     def _beside_rest(self, about: frozenset[str]) -> float:
         """Nats that motion, forces and tracker cost at least under a hypothesis about these devices."""
         account = self.plain if "rest" in about else self.without(about)

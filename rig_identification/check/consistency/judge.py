@@ -123,7 +123,8 @@ def _weigh(evidence: Evidence, hypothesis: Hypothesis, thorough: bool, floor: fl
     account = evidence.judged(hypothesis, thorough, evidence.plain.cost - price - floor)
     if account.rest is None:
         return Weighed(hypothesis, account, -np.inf, -np.inf)
-    gain = evidence.plain.cost - account.cost
+    plain = evidence.plain_beside(account) if thorough else evidence.plain.cost
+    gain = plain - account.cost
     return Weighed(hypothesis, account, gain, gain - price)
 
 
