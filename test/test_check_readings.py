@@ -14,6 +14,7 @@ from session_samples import make_rig
 from rig_identification.check import readings
 from rig_identification.check.examine import examine
 from rig_identification.check.found import examiners
+from rig_identification.check.readings import coarse_steps
 from rig_identification.check.readings.averages_undone import averaged, spread, undone
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
@@ -407,7 +408,9 @@ def test_rest_at_the_end_of_the_range_is_left_out() -> None:
 @pytest.mark.parametrize("step", [0.0, 1.0 / 64.0, 2.0, 20.0])
 def test_nothing_is_told_of_clean_recordings(noise: float, step: float) -> None:
     """Noise-free simulations, fine and coarse converters, at rest and in motion."""
-    assert examined(make_raw(7, noise=noise, step=step))[0] == []
+    faults = examined(make_raw(7, noise=noise, step=step))[0]
+    # Steps of ten times the described noise are one, whatever the simulation's own noise is
+    assert {fault.where.get("law") for fault in faults} == ({"steps"} if step == 20.0 else set())
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
@@ -448,5 +451,31 @@ def test_a_filter_of_the_sensor_is_no_average() -> None:
 
 @pytest.mark.skipif(not SESSIONS, reason=f"no sessions in {RECORDINGS}: set RIG_IDENTIFICATION_RECORDINGS")
 @pytest.mark.parametrize("folder", SESSIONS, ids=lambda folder: folder.name)
-def test_nothing_is_told_of_recordings_of_rigs(folder: Path) -> None:
-    assert examined(read_raw(folder))[0] == []
+def test_nothing_but_what_is_there_is_told_of_recordings_of_rigs(folder: Path) -> None:
+    told = [fault.effect for fault in examined(read_raw(folder))[0]]
+    # The film of this one was read at half of its pictures' rate
+    assert told == (["held_samples"] if folder.name == "ucd_selftest" else [])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_coarse_steps_are_told_and_their_passages_kept(seed: int) -> None:
+    exact = make_raw(seed, noise=0.0, step=0.0)
+    rounded = make_raw(seed, step=12.0 * NOISE)
+    found = coarse_steps.find(rounded)
+    told = {f.fault.where["channel"] for f in found}
+    assert told >= {*CELLS}
+    assert all(f.fault.where["law"] == "steps" for f in found)
+    step = {f.fault.where["channel"]: f.fault.parameters["step"]["value"] for f in found}
+    assert step["cable_1"] == pytest.approx(12.0 * NOISE)
+    for number, recording in enumerate(exact.recordings):
+        for kept, true in zip(found[-1].session.recordings[number].channels, recording.channels, strict=True):
+            if true.channel == "tension":
+                off = (kept.values - true.values)[np.isfinite(kept.values)]
+                # Each passage is read to within the noise, where the rounded samples are off by 3.5 of it
+                assert off.size == 0 or np.sqrt(np.mean(off**2)) < 1.2 * NOISE
+                assert recording.kind == "static" or off.size > 50
+
+
+@pytest.mark.parametrize("step", [0.0, 1.0, 2.0, 3.0])
+def test_steps_that_noise_spreads_over_are_no_fault(step: float) -> None:
+    assert coarse_steps.find(make_raw(step=step * NOISE)) == ()

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bench.first_day.faults.base import (
+    IMU_FORCE,
     IMU_RATE,
     Array,
     Case,
@@ -31,6 +32,7 @@ LawOf = Callable[[RawSession, str], Law]  # set by what the device itself reads
 
 GAINS = (0.01, 0.03, 0.1)
 BEYOND = (0.02, 0.2, 0.6)  # share of moving samples beyond the range
+COARSE = (6.0, 20.0)  # steps of a converter, in units of the noise
 RATE_RANGE = np.deg2rad(250.0)  # rad/s, full scale of a gyroscope
 
 
@@ -41,6 +43,29 @@ def cases(raw: RawSession) -> Iterator[Case]:
         yield from _zeroed(raw)
         yield from _gains(raw)
     yield from _ranges(raw, held)
+    yield from _steps(raw, held)
+
+
+def _steps(raw: RawSession, held: tuple[str, ...]) -> Iterator[Case]:
+    """Converters whose steps noise does not spread over: a law that the table has no word for."""
+    for steps in COARSE:
+        for label, names in one_and_all(raw, 1) if cells(raw) else ():
+            step = steps * raw.rig.noise["tension"]
+            injector = on_values(names, _rounded(step, slice(None)))
+            yield Case(f"cells/coarse_steps/{label}/{steps:.0f}_noise", "unknown", names, injector)
+        if "imu" in held:
+            step = steps * raw.rig.noise["specific_force"]
+            injector = on_values(("imu",), _rounded(step, IMU_FORCE))
+            yield Case(f"cells/coarse_steps/imu/{steps:.0f}_noise", "unknown", ("imu",), injector)
+
+
+def _rounded(step: float, columns: slice) -> Law:
+    def law(values: Array) -> Array:
+        out = values.copy()
+        out[:, columns] = step * np.round(values[:, columns] / step)
+        return np.asarray(out)
+
+    return law
 
 
 def _zeroed(raw: RawSession) -> Iterator[Case]:

@@ -117,8 +117,8 @@ class Evidence:
     def plain_beside(self, other: Account) -> float:
         """Nats of the session as it is once the motion of another account may be its own as well.
 
-        Readings that are hardly more than noise leave the motion open, and forces tell such motions apart: what
-        a hypothesis gains by its motion alone is no gain.
+        Readings that are hardly more than noise leave the motion open, and forces tell such motions apart:
+        what a hypothesis gains by its motion alone is no gain.
         """
         if self.plain.rest is None or not other.motions:
             return self.plain.cost
