@@ -47,8 +47,9 @@ Array = NDArray[np.float64]
 #: hard as that and resists sideways most.
 PULL, SHORT_HOSE = 0.02, 1.0
 ADVICE = "Let cables and hoses hang free in a long loop, or take them off."
-#: s: a hose's damping over the weight and the cables' length, and the std of its logarithm. It loses some tenths
-#: of what it is stretched by in a swing, and never gives: 30 N/m that lose a fifth at 0.5 Hz damp with 2 N s/m.
+#: s: a hose's damping over the weight and the cables' length, and the std of its logarithm. It loses
+#: some tenths of what it is stretched by in a swing, and never gives: 30 N/m that lose a fifth at 0.5 Hz
+#: damp by 2 N s/m.
 DAMPED, DAMPED_SPREAD = 0.002, 1.2
 #: Places lie within so much of the rig's longest side about the middle.
 REACH = 0.6
