@@ -22,6 +22,8 @@ from rig_identification.cli import commands
 from rig_identification.errors import InputError, MissingDescription
 
 PROGRAM = "rig-identification"
+#: Names the folder of a lab's own effects (:mod:`rig_identification.own`), which only a model loads.
+EFFECTS_FOLDER = "RIG_IDENTIFICATION_EFFECTS"
 
 SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
@@ -55,6 +57,11 @@ def build_parser() -> argparse.ArgumentParser:
         )
         command.configure(subparser)
         subparser.add_argument(
+            "--effects",
+            metavar="DIR",
+            help="folder of effects of your own, one Python file each; default: $RIG_IDENTIFICATION_EFFECTS",
+        )
+        subparser.add_argument(
             "--debug", action="store_true", help="show where a defect of this package lies"
         )
         subparser.set_defaults(run=command.run)
@@ -72,6 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     _accept_any_terminal()
     arguments = build_parser().parse_args(argv)
     try:
+        if arguments.effects is not None:
+            os.environ[EFFECTS_FOLDER] = arguments.effects
         arguments.run(arguments)
     except InputError as error:
         _say(f"error: {error}")

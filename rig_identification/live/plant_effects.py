@@ -109,6 +109,7 @@ class PlantEffects:
     level_error: Array = field(default_factory=lambda: np.zeros(2))  # rad, ceiling tilted about world x and y
     riders: tuple[Rider, ...] = ()
     ceiling: YieldingCeiling | None = None
+    own: tuple[tuple[float, ...], ...] = ()  # numbers of each of the lab's own effects (own.py)
     push: Push | None = None  # acts through the motion's input, not through the model's numbers
 
 
@@ -149,6 +150,9 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.LAW_POINT : block + place.LAW_POINT + 3] = effects.law_point
     physics[block + place.LAW_DIRECTION : block + place.LAW_DIRECTION + 2] = effects.law_line
     physics[block + place.LAW_NARROW] = effects.law_narrow
+    for k, numbers in enumerate(effects.own):
+        first = block + place.OWN + place.OWN_SIZE * k + 2
+        physics[first : first + len(numbers)] = numbers
     out = elastic.with_physics(physics)
     for rider in effects.riders:
         out = out.with_internal(rider.blocks(rest.R_world_body))

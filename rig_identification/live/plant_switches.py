@@ -18,6 +18,7 @@ from rig_identification.live.push import Push
 from rig_identification.model import layout
 from rig_identification.model.body import can_exist, elements_from_linear, linear_from_elements
 from rig_identification.model.motion import RigModel
+from rig_identification.own import own_effects
 
 Array = NDArray[np.float64]
 #: Widths that the rig decides: one number each cable, three each cable, or as many as one likes.
@@ -119,6 +120,18 @@ SWITCHES = (
 )  # fmt: skip
 
 
+def switches() -> tuple[Switch, ...]:
+    """Every switch, those of the lab's own effects last."""
+    return (
+        *SWITCHES,
+        *(
+            Switch(f"{effect.name}.{n.name}", 0.0, f"{n.name} of {effect.name}", -1e12, 1e12, n.unit)
+            for effect in own_effects()
+            for n in effect.numbers
+        ),
+    )
+
+
 def effects_of(
     given: Mapping[str, float | Sequence[float] | Array], model: RigModel, prefix: str = ""
 ) -> PlantEffects:
@@ -131,12 +144,12 @@ def effects_of(
     InputError
         A name is unknown, a number makes no sense, or so much of the body rides that none is left.
     """
-    known = {switch.name for switch in SWITCHES}
+    known = {switch.name for switch in switches()}
     for name in given:
         if name not in known:
             near = did_you_mean(name, known)
             raise InputError(f"{prefix}{name}: is unknown; known are {', '.join(sorted(known))}{near}")
-    values = {s.name: s.checked(given.get(s.name, s.default), model.cables, prefix) for s in SWITCHES}
+    values = {s.name: s.checked(given.get(s.name, s.default), model.cables, prefix) for s in switches()}
 
     def number(name: str) -> float:
         return float(values[name][0])
@@ -186,6 +199,9 @@ def effects_of(
         level_error=values["level_error"],
         riders=riders,
         ceiling=ceiling if np.any(stiffness > 0.0) else None,
+        own=tuple(
+            tuple(number(f"{effect.name}.{n.name}") for n in effect.numbers) for effect in own_effects()
+        ),
         push=push if push.peak_force > 0.0 else None,
     )
 

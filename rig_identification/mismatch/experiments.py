@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rig_identification.own import own_effects
+
 _TURNED = (
     "hang the body turned by 180 degrees about the vertical: what belongs to the ceiling stays, what belongs "
     "to the body turns along"
@@ -56,4 +58,5 @@ _EXPERIMENTS = {
 
 def experiment_for(kind: str) -> str:
     """What to do to tell a kind of effect (Candidate.kind) from its rivals; empty where nothing is known."""
-    return _EXPERIMENTS.get(kind, "")
+    own = {effect.name: effect.experiment for effect in own_effects()}
+    return _EXPERIMENTS.get(kind, own.get(kind, ""))

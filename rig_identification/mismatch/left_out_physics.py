@@ -11,6 +11,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL, ParameterSet
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.candidate import Candidate, Told, added
+from rig_identification.mismatch.own_effects import own_hypotheses
 from rig_identification.mismatch.tethers import tethers
 from rig_identification.model import layout
 from rig_identification.model.body import (
@@ -108,6 +109,7 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
         _cable_mass(rig, block),
         *_cable_torsion(mass * rig.gravity, block),
         *tethers(rig, mass),
+        *own_hypotheses(rig, mass, block),
     ]
     if rig.exciter is not None:
         out.append(

@@ -16,6 +16,8 @@ from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
     LINEAR_DENSITY,
+    OWN,
+    OWN_SIZE,
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
     SHARING,
@@ -23,6 +25,7 @@ from rig_identification.model.effects.place import (
 )
 from rig_identification.model.integrate import accumulate, propagate
 from rig_identification.model.substeps import FINE_STEP, FIT_STEP, hanging, substeps_for
+from rig_identification.own import own_effects
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -128,6 +131,9 @@ def rig_model(
     physics[layout.effects_offset(n) + CREEP] = CREEP_RATE
     physics[layout.effects_offset(n) + LINEAR_DENSITY] = rig.cable_linear_density or 0.0
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
+    for k, effect in enumerate(own_effects()):
+        at = layout.effects_offset(n) + OWN + OWN_SIZE * k
+        physics[at : at + 2] = [code.address for code in effect.code]
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic
     return RigModel(

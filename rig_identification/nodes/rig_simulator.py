@@ -14,7 +14,7 @@ from rig_identification.errors import InputError
 from rig_identification.live.machine_code import compile_plant
 from rig_identification.live.plant import Plant, Shaking, odometry_values
 from rig_identification.live.plant_effects import with_effects
-from rig_identification.live.plant_switches import SWITCHES, effects_of
+from rig_identification.live.plant_switches import effects_of, switches
 from rig_identification.model.body import can_exist
 from rig_identification.model.motion import Motion, rig_model
 from rig_identification.nodes.parameters import OwnParameter, within
@@ -32,7 +32,7 @@ EFFECTS = tuple(
         switch.meaning,
         within(switch.low, switch.high, switch.unit),
     )
-    for switch in SWITCHES
+    for switch in switches()
 )
 PARAMETERS = (
     OwnParameter("speed", 1.0, "simulated seconds a second", within(0.01, 100.0)),
@@ -105,7 +105,7 @@ class RigSimulator(RigNode):
                 f"parameter body.inertia: no body has {inertia.tolist()} kg m^2; order is xx xy xz yy yz zz"
             )
         model = rig_model(rig, elements)
-        switched = {switch.name: self.own.vector(f"effect.{switch.name}") for switch in SWITCHES}
+        switched = {switch.name: self.own.vector(f"effect.{switch.name}") for switch in switches()}
         effects = effects_of(switched, model, "parameter effect.")
         return Plant(with_effects(model, effects), time.time_ns(), push=effects.push)
 

@@ -12,7 +12,7 @@ from scipy.stats import truncnorm
 from rig_identification.errors import InputError, did_you_mean
 from rig_identification.estimate.parameters import INERTIAL, UNKNOWN_ROTATION, ParameterSet, parameter_set
 from rig_identification.live.plant_effects import PlantEffects, with_effects
-from rig_identification.live.plant_switches import SWITCHES, effects_of
+from rig_identification.live.plant_switches import effects_of, switches
 from rig_identification.model import layout, sensors
 from rig_identification.model.motion import RigModel, rig_model
 from rig_identification.rig import Rig
@@ -89,12 +89,14 @@ def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
     return _with_device_errors(_with_physics(out, spec), spec) if spec.effects else out
 
 
-_SWITCHED = frozenset(switch.name for switch in SWITCHES)
+def _switched() -> frozenset[str]:
+    return frozenset(switch.name for switch in switches())
 
 
 def _with_physics(true: TrueRig, spec: SessionSpec) -> TrueRig:
     """The rig with its plant's effects."""
-    given = {name: values for name, values in spec.effects.items() if name in _SWITCHED}
+    switched = _switched()
+    given = {name: values for name, values in spec.effects.items() if name in switched}
     effects = effects_of(given, true.model, "effect ")
     return replace(true, model=with_effects(true.model, effects), effects=effects)
 
@@ -103,14 +105,14 @@ def _with_device_errors(true: TrueRig, spec: SessionSpec) -> TrueRig:
     """The rig with its devices' errors."""
     device, values = true.device.copy(), dict(true.values)
     errors = {p.name: p.index for p in true.parameters.free if p.kind == "device"}
-    measured = channels_of(spec)
+    measured, switched = channels_of(spec), _switched()
     errors |= {n: e for n, e in true.parameters.places.laws().items() if n.split(".")[0] in measured}
     for name, given in spec.effects.items():
-        if name in _SWITCHED:
+        if name in switched:
             continue
         if name not in errors:
-            known = ", ".join(sorted([*_SWITCHED, *errors]))
-            near = did_you_mean(name, [*_SWITCHED, *errors])
+            known = ", ".join(sorted([*switched, *errors]))
+            near = did_you_mean(name, [*switched, *errors])
             raise InputError(f"effect {name}: is unknown; known are {known}{near}")
         if len(given) != 1 or not np.isfinite(given[0]):
             raise InputError(f"effect {name}: give one finite number")

@@ -21,6 +21,7 @@ from rig_identification.model.effects.hinge_damping import add_hinge_damping
 from rig_identification.model.effects.hinge_friction import add_hinge_friction
 from rig_identification.model.effects.hinge_roll import add_hinge_roll
 from rig_identification.model.effects.internal import add_internal
+from rig_identification.model.effects.own import add_own, own_active
 from rig_identification.model.effects.place import (
     ADDED_MASS,
     BENDING,
@@ -89,7 +90,8 @@ def effects_follow(physics, modes, internal):  # type: ignore[no-untyped-def]
         if active(physics[block + i]):
             turn = True
             place = place or i not in (ADDED_MASS, ROTOR_MASS, GYROSCOPIC_SHARE, TURNING_CUBE)
-    return place, turn
+    own = own_active(physics, block)
+    return place or own, turn or own
 
 
 @njit(cache=True)
@@ -125,6 +127,8 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
         add_tether(physics, block, x, R, r)
     if _any_active(physics, block + LAW_SPRING, 5):
         add_point_law(physics, block, x, R, r)
+    if own_active(physics, block):
+        add_own(physics, block, x, R, r)
     if x.shape[0] > BODY_STATE:
         add_internal(physics, block, modes, x, R, K, r)
 
