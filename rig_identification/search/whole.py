@@ -61,6 +61,8 @@ def in_whole_runs(
     try:
         named = _beside_rivals(Named(problem, (*earlier, ranked[0]), budget, heard=heard), ranked[1:])
         best = whole_runs(ideal, named)
+        if not best.wholly:
+            named, best, ranked = _next_likely(ideal, named, best, ranked, say)
         if best.wholly:
             named, best = _likeliest(ideal, named, best, ranked, say)
             named, best = _simplified(ideal, named, best, candidates, say)
@@ -85,6 +87,25 @@ def _beside_rivals(named: Named, others: list[Trial]) -> Named:
         rivals=tuple(rival(t, gap) for gap, t in gaps),
         bodies=tuple((gap, inertial_estimate(t.problem, t.evaluation)) for gap, t in gaps),
     )
+
+
+def _next_likely(
+    ideal: Ideal, named: Named, best: Explained, ranked: list[Trial], say: Say
+) -> tuple[Named, Explained, list[Trial]]:
+    """The likeliest of the close rivals that explains all, where the first of them does not.
+
+    best: whole runs with the first. Returns what is given where none does.
+    """
+    earlier = named.found[:-1]
+    for k, trial in enumerate(ranked[1:], start=1):
+        if named.budget.spent() or ranked[0].evidence - trial.evidence > CLOSE:
+            break
+        its = _beside_rivals(replace(named, found=(*earlier, trial)), ranked[k + 1 :])
+        say("whole runs with " + trial.candidate.label)
+        found = whole_runs(ideal, its)
+        if found.wholly:
+            return its, found, ranked[k:]
+    return named, best, ranked
 
 
 def _likeliest(

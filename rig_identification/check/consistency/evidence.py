@@ -94,7 +94,8 @@ class Evidence:
         start = None if fresh else self.without(hypothesis.about)
         if start is None or start.rest is None:
             moved = bool(hypothesis.about & MOVING) or hypothesis.change.rig is not None
-            spared = most - self._beside_rest(hypothesis.about)
+            # Where the body may move otherwise nothing is known of what its motion costs at least
+            spared = most if moved else most - self._beside_rest(hypothesis.about)
             account = self._account(changed, hypothesis.loosened, self.plain, moved, spared)
             possible = account.rest is not None and hypothesis.possible(account.rest)
             return account if possible else Account(None, (), float("inf"), {})

@@ -94,7 +94,9 @@ def _weighed(evidence: Evidence) -> list[Weighed]:
     quick = _compared(evidence)
     close = [w for w in quick[:FINALISTS] if w.net > quick[0].net - NEAR and w.net > -NEAR]
     final = [_weigh(evidence, w.hypothesis, thorough=True) for w in close]
-    return sorted(final, key=lambda w: -w.net)
+    plain = min((evidence.plain_beside(w.account) for w in final), default=evidence.plain.cost)
+    lost = evidence.plain.cost - plain
+    return sorted((replace(w, gain=w.gain - lost, net=w.net - lost) for w in final), key=lambda w: -w.net)
 
 
 def _compared(evidence: Evidence) -> list[Weighed]:
@@ -123,8 +125,7 @@ def _weigh(evidence: Evidence, hypothesis: Hypothesis, thorough: bool, floor: fl
     account = evidence.judged(hypothesis, thorough, evidence.plain.cost - price - floor)
     if account.rest is None:
         return Weighed(hypothesis, account, -np.inf, -np.inf)
-    plain = evidence.plain_beside(account) if thorough else evidence.plain.cost
-    gain = plain - account.cost
+    gain = evidence.plain.cost - account.cost
     return Weighed(hypothesis, account, gain, gain - price)
 
 
