@@ -30,6 +30,8 @@ from rig_identification.rig import Rig
 RUNS = 1
 #: Devices whose readings tell how the body moves.
 MOVING = frozenset(["imu", "imu.gyroscope", "imu.accelerometer", "inclinometer", "mocap"])
+#: What a hypothesis is about that makes another rig: no device bounds what it can gain.
+EVERYTHING = "everything"
 #: Nats below which readings at rest agree: less than any fault costs.
 PRICELESS = 9.0
 
@@ -80,6 +82,8 @@ class Evidence:
 
         "rest": what the description says of the body at rest, on which the forces of its motion rest as well.
         """
+        if EVERYTHING in devices:
+            return self.plain.cost
         if "rest" in devices:
             return sum(nats for name, nats in self.plain.parts.items() if _of_the_body(name))
         return self.plain.cost - self.without(devices).cost

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.evidence import EVERYTHING, Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, Reading, fault
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.examination import SetupFault
@@ -133,7 +133,7 @@ def _description(unit: str, factor: float) -> Hypothesis:
         )
 
     return Hypothesis(
-        Change(rig=lambda rig: _in_metres(rig, factor)), describe, frozenset(["imu.accelerometer"]),
+        Change(rig=lambda rig: _in_metres(rig, factor)), describe, frozenset([EVERYTHING]),
         variants=len(LENGTHS), fresh=True,
     )  # fmt: skip
 
