@@ -51,6 +51,8 @@ REACHED = 0.5
 SEEN, CHIEF = 4.0, 0.5
 #: Log evidence by which a hypothesis trails at the same level (odds of 1 to 20,000) that is no rival.
 RIVAL = 10.0
+#: Level at which a wrench of 3 % of the weight carries all but the largest effects.
+STRONG = 1
 #: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
 MEANT = 3.0
 #: Steps of the first fit of each. What a further step promises is counted: with four steps the same were the
@@ -101,7 +103,8 @@ def children(
         say("screening")
         promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
         promises += promised_laws(rung, standing.found)
-    first = _first_fits(standing, worthy(promises, count_of(candidates)), budget, say)
+    promised_here = worthy(promises, count_of(candidates))
+    first = _first_fits(standing, promised_here, budget, say)
     first += _giving_way(standing, first, budget, say)
     first += _alike(standing, first, left, budget, say)
     first = [child for child in first if not contradicted(_last_of(child))]
@@ -122,9 +125,39 @@ def children(
         if down is not None:
             walked.append(replace(child, rung=down))
             walked += _closer(problem, walked[-1], budget, say)
+    if not any(w.rung.alone for w in walked):
+        walked += _unbent(standing, left, promised_here, budget, say)
     ordinary = ordinary_errors(problem)
     sensible = (_earned(standing, s) for s in walked if _makes_sense(s, ordinary))
     return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
+
+
+def _unbent(
+    standing: Standing, left: list[Candidate], known: list[Promise], budget: Budget, say: Say
+) -> list[Standing]:
+    """What else is promised where the wrench is strong, walked down from there; nothing beside other effects.
+
+    A model at its own level bends what it has, the body before all, to what it lacks. Where nothing weighs
+    the body but a weak exciter, it bends so far that first order about it knows nothing of a liquid. A wrench
+    that carries nearly anything leaves the body to what the recordings say of it.
+    """
+    rung = standing.rung
+    if standing.found or rung.level <= STRONG or rung.alone or budget.spent():
+        return []
+    strong = fitted_at(rung.model, replace(rung.evaluation.point, latents=()), STRONG, FIRST_STEPS)
+    if strong is None:
+        return []
+    say("screening with a strong wrench")
+    promises = screen(strong.problem, strong.evaluation, left, mass_of(strong.problem, strong.evaluation))
+    kinds = {p.candidate.kind for p in known}
+    others = [p for p in worthy(promises, count_of(left)) if p.candidate.kind not in kinds][:ALIKE]
+    first = _first_fits(Standing(strong), others, budget, say)
+    if not first:
+        return []
+    best = max(first, key=lambda child: child.rung.within_reach)
+    say(best.found[-1].label)
+    down = walked_down(best.rung.model, best.rung.evaluation.point, STRONG)
+    return [] if down is None else [replace(best, rung=down)]
 
 
 def _clocks_and_lags(ranked: list[Standing]) -> list[Standing]:
