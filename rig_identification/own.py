@@ -12,16 +12,15 @@ import importlib.util
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from rig_identification.errors import InputError
-from rig_identification.model.effects.own import compiled
-from rig_identification.model.effects.place import OWN_CALLS, OWN_NUMBERS
 from rig_identification.rig import Rig
 
 VARIABLE = "RIG_IDENTIFICATION_EFFECTS"
+#: Effects that are used at once, and numbers that each may have.
+MOST_EFFECTS, MOST_NUMBERS = 3, 8
 
 
 @dataclass(frozen=True)
@@ -59,11 +58,6 @@ class OwnEffect:
     advice: str  # what to do about it
     experiment: str = ""  # what would tell it from its rivals
 
-    @cached_property
-    def code(self) -> tuple[Any, Any]:
-        """Its machine code, kept for as long as the effect is."""
-        return compiled(self.wrench)
-
 
 def own_effects() -> tuple[OwnEffect, ...]:
     """Effects of the folder that is named, none where none is. Raises InputError where a file is none."""
@@ -78,8 +72,8 @@ def _effects_in(folder: str) -> tuple[OwnEffect, ...]:
     if not path.is_dir():
         raise InputError(f"{folder}: is no folder; --effects takes a folder with one Python file an effect")
     found = tuple(_effect(file) for file in sorted(path.glob("*.py")))
-    if len(found) > OWN_CALLS:
-        raise InputError(f"{folder}: holds {len(found)} effects; at most {OWN_CALLS} can be used at once")
+    if len(found) > MOST_EFFECTS:
+        raise InputError(f"{folder}: holds {len(found)} effects; at most {MOST_EFFECTS} can be used at once")
     return found
 
 
@@ -95,8 +89,8 @@ def _effect(file: Path) -> OwnEffect:
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, OwnEffect):
         raise InputError(f"{file}: defines no EFFECT; set it to a rig_identification.own.OwnEffect")
-    if not 1 <= len(effect.numbers) <= OWN_NUMBERS:
+    if not 1 <= len(effect.numbers) <= MOST_NUMBERS:
         raise InputError(
-            f"{file}: {effect.name} has {len(effect.numbers)} numbers; 1 to {OWN_NUMBERS} can be"
+            f"{file}: {effect.name} has {len(effect.numbers)} numbers; 1 to {MOST_NUMBERS} can be"
         )
     return effect

@@ -13,7 +13,7 @@ from rig_identification.cli.main import main
 from rig_identification.errors import InputError
 from rig_identification.model import layout
 from rig_identification.model.effects import place
-from rig_identification.model.effects.own import add_own
+from rig_identification.model.effects.own import add_own, code_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "own-effect.md"
 MOMENTUM = 30.0  # N m s
@@ -34,7 +34,7 @@ def test_a_wheel_turns_its_momentum_with_the_body() -> None:
     """The moment is -w x h, for real numbers and as a derivative, and does no work."""
     (effect,) = own.own_effects()
     physics = np.zeros(place.EFFECTS_SIZE)
-    physics[place.OWN : place.OWN + 2] = [code.address for code in effect.code]
+    physics[place.OWN : place.OWN + 2] = [code.address for code in code_of(effect)]
     physics[place.OWN + 2] = MOMENTUM
     x, r = np.zeros(layout.BODY_STATE), np.zeros(6)
     rate = np.array([0.2, -0.5, 0.7])

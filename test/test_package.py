@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "rig_identification"
 NAME = "rig_identification"
 
-VALUES = {"", "errors", "examination", "quantity", "raw", "rig", "recording", "result", "topics"}
+VALUES = {"", "errors", "examination", "own", "quantity", "raw", "rig", "recording", "result", "topics"}
 CORE = {"model", "estimate", "mismatch", "search", "statics", "live"}
 # What a room may import of the package besides itself and the shared values; the front door may import all.
 ALLOWED = {

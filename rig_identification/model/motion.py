@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from rig_identification.model import layout, work
 from rig_identification.model.body import linear_from_elements
 from rig_identification.model.constraints import project_columns, project_state
+from rig_identification.model.effects.own import code_of
 from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
@@ -133,7 +134,7 @@ def rig_model(
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     for k, effect in enumerate(own_effects()):
         at = layout.effects_offset(n) + OWN + OWN_SIZE * k
-        physics[at : at + 2] = [code.address for code in effect.code]
+        physics[at : at + 2] = [code.address for code in code_of(effect)]
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic
     return RigModel(

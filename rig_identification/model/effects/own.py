@@ -7,7 +7,7 @@ for it. An address is a whole number below 2^53, which a float holds exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 from numba.extending import intrinsic
 
-from rig_identification.model.effects.place import OWN, OWN_CALLS, OWN_NUMBERS, OWN_SIZE, active
+from rig_identification.model.effects.place import OWN, OWN_SIZE, active
+from rig_identification.own import MOST_EFFECTS, MOST_NUMBERS, OwnEffect
 
 _WORDS = types.void(types.int64, types.int64, types.int64, types.int64)
 
@@ -43,12 +44,13 @@ def _call(typing, code, numbers, x, R, wrench):  # type: ignore[no-untyped-def]
     return types.void(code, numbers, x, R, wrench), generate
 
 
-def compiled(wrench: Callable[..., None]) -> tuple[Any, Any]:
-    """A wrench as machine code for real and for complex numbers; ``address`` of each is where it stands.
+@lru_cache(maxsize=64)
+def code_of(effect: OwnEffect) -> tuple[Any, Any]:
+    """An effect's wrench as machine code for real and for complex numbers; ``address`` is where each stands.
 
-    The caller keeps both for as long as a model calls them.
+    It is kept for as long as the process runs: models call it.
     """
-    law = njit(nogil=True)(wrench)
+    law = njit(nogil=True)(effect.wrench)
     return _code(law, np.float64), _code(law, np.complex128)
 
 
@@ -56,7 +58,7 @@ def _code(law: Any, kind: Any) -> Any:
     @cfunc(_WORDS)
     def call(numbers, x, R, out):  # type: ignore[no-untyped-def]
         law(
-            carray(_pointer(numbers), OWN_NUMBERS, kind),  # type: ignore[call-arg]
+            carray(_pointer(numbers), MOST_NUMBERS, kind),  # type: ignore[call-arg]
             carray(_pointer(x), 12, kind),  # type: ignore[call-arg]
             carray(_pointer(R), (3, 3), kind),  # type: ignore[call-arg]
             carray(_pointer(out), 6, kind),  # type: ignore[call-arg]
@@ -69,7 +71,7 @@ def _code(law: Any, kind: Any) -> Any:
 def own_active(physics, block):  # type: ignore[no-untyped-def]
     """Whether any effect of the lab's own is asked for."""
     found = False
-    for k in range(OWN_CALLS):
+    for k in range(MOST_EFFECTS):
         first = block + OWN + OWN_SIZE * k
         for i in range(first + 2, first + OWN_SIZE):
             found = found or active(physics[i])
@@ -80,16 +82,16 @@ def own_active(physics, block):  # type: ignore[no-untyped-def]
 def add_own(physics, block, x, R, r):  # type: ignore[no-untyped-def]
     """Add the wrench of each effect that has a number to r."""
     wrench = np.zeros(6, physics.dtype)
-    for k in range(OWN_CALLS):
+    for k in range(MOST_EFFECTS):
         first = block + OWN + OWN_SIZE * k
         asked = False
         for i in range(first + 2, first + OWN_SIZE):
             asked = asked or active(physics[i])
-        if not asked:
+        code = physics[first if wrench.itemsize == 8 else first + 1].real
+        if not asked or code == 0.0:
             continue
         numbers = physics[first + 2 : first + OWN_SIZE]
         wrench[:] = 0.0
-        code = physics[first if wrench.itemsize == 8 else first + 1].real
         _call(np.int64(code), numbers.ctypes.data, x.ctypes.data, R.ctypes.data, wrench.ctypes.data)  # type: ignore[call-arg]
         for i in range(6):
             r[i] += wrench[i]

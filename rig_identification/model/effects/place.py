@@ -8,6 +8,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.layout import CABLE_SIZE, CABLES, INTERNAL_SIZE
+from rig_identification.own import MOST_EFFECTS, MOST_NUMBERS
 
 # Amounts first: where all of them are zero, no effect acts
 DAMPING = 0  # N m s/rad
@@ -42,10 +43,11 @@ LAW_DIRECTION = 57  # 2: rad, azimuth and elevation of the spring's line in the 
 LAW_NARROW = 59  # 1/m^2: how fast the brake fades away from where its point hangs at rest
 TETHER_DAMPING = 60  # N s/m, along a taut tether
 TETHER_PRELOAD = 61  # N: pull of a taut tether at rest, beside what TETHER_PULL has along it
-OWN = 62  # OWN_CALLS times OWN_SIZE: effects of the lab's own (own.py), two addresses and their numbers each
-OWN_CALLS, OWN_NUMBERS = 3, 8
-OWN_SIZE = 2 + OWN_NUMBERS
-EFFECTS_SIZE = OWN + OWN_CALLS * OWN_SIZE
+OWN = (
+    62  # MOST_EFFECTS times OWN_SIZE: effects of the lab's own (own.py), two addresses and their numbers each
+)
+OWN_SIZE = 2 + MOST_NUMBERS
+EFFECTS_SIZE = OWN + MOST_EFFECTS * OWN_SIZE
 
 
 def effects_block(cables: int) -> int:
