@@ -3,7 +3,7 @@
 A file in the folder that ``--effects DIR`` or the environment variable ``RIG_IDENTIFICATION_EFFECTS``
 names defines ``EFFECT``, an :class:`OwnEffect`: a wrench that depends on where the body is, how it is
 turned and how it moves, its numbers with what is believed of them, and what a person is told. It is
-simulated, searched, fitted and told. docs/own-effect.md shows one.
+simulated, searched, fitted and told. docs/how-to/own-effect.md shows one.
 """
 
 from __future__ import annotations

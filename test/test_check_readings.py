@@ -476,6 +476,20 @@ def test_coarse_steps_are_told_and_their_passages_kept(seed: int) -> None:
                 assert recording.kind == "static" or off.size > 50
 
 
+def test_coarse_steps_of_two_axes_of_one_channel_are_each_kept_half_way() -> None:
+    """What one axis keeps is not undone by what the other one does."""
+    raw = make_raw(step=200.0 * NOISE)
+    found = [f for f in coarse_steps.find(raw) if f.fault.where["channel"] == "imu"]
+    assert len({f.fault.where["axis"] for f in found}) > 1
+    for f in found:
+        column = "xyz".index(f.fault.where["axis"]) + 3 * (f.fault.where["quantity"] == "specific_force")
+        step = f.fault.parameters["step"]["value"]
+        for recording in found[-1].session.recordings:
+            (imu,) = (c.values[:, column] for c in recording.channels if c.device == "imu")
+            apart = np.abs(imu[np.isfinite(imu)] / step % 1.0 - 0.5)
+            assert np.all(apart < 0.25)
+
+
 @pytest.mark.parametrize("step", [0.0, 1.0, 2.0, 3.0])
 def test_steps_that_noise_spreads_over_are_no_fault(step: float) -> None:
     assert coarse_steps.find(make_raw(step=step * NOISE)) == ()

@@ -15,8 +15,8 @@ from rig_identification.recording import ChannelQuality, Overrange, Series
 from rig_identification.topics import Topic
 
 _SECOND = 1e9
-#: Channels whose sensor has an end of range: device, quantity, axis and unit of each column.
-_CAN_CLIP: dict[str, tuple[tuple[str | None, str, str | None, str], ...]] = {
+#: Channels whose sensor has an end of range and steps: device, quantity, axis and unit of each column.
+COLUMNS: dict[str, tuple[tuple[str | None, str, str | None, str], ...]] = {
     "tension": ((None, "tension", None, "N"),),
     "exciter_force": tuple(("exciter", "force", a, "N") for a in "xyz"),
     "imu": (
@@ -85,7 +85,7 @@ class Channel:
         )
 
     def _overrange(self, limit: Limit, stamps: NDArray[np.int64], start_ns: int) -> Overrange:
-        device, quantity, axis, unit = _CAN_CLIP[self.topic.channel][limit.column]
+        device, quantity, axis, unit = COLUMNS[self.topic.channel][limit.column]
         first, last = (float((stamps[k] - start_ns) / _SECOND) for k in (0, -1))
         name = device or str(self.topic.cable)
         return Overrange(name, quantity, axis, unit, limit.value, len(stamps), first, last)
@@ -135,10 +135,10 @@ def _clean(
     elif held:
         names = ", ".join(_names(topic.channel)[k] for k in held)
         notes = (f"{names}: one and the same number in every message, taken as not measured",)
-    elif topic.channel in _CAN_CLIP and len(values) >= _STUCK and not _changes(values[finite]).any():
+    elif topic.channel in COLUMNS and len(values) >= _STUCK and not _changes(values[finite]).any():
         notes = ("the values never change: the device may be stuck or switched off",)
     clipped = np.zeros(len(values), bool)
-    ends = limits(values[finite]) if topic.channel in _CAN_CLIP else []
+    ends = limits(values[finite]) if topic.channel in COLUMNS else []
     used = finite.copy()
     for end in ends:
         clipped[finite] |= end.stuck
@@ -176,8 +176,8 @@ def _changes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _names(channel: str) -> list[str]:
     """What each column of a channel is called."""
-    if channel in _CAN_CLIP:
-        return [f"{quantity} {axis}".replace("_", " ") for _, quantity, axis, _ in _CAN_CLIP[channel]]
+    if channel in COLUMNS:
+        return [f"{quantity} {axis}".replace("_", " ") for _, quantity, axis, _ in COLUMNS[channel]]
     return [*(f"position {a}" for a in "xyz"), *(f"orientation {a}" for a in "xyzw")]
 
 

@@ -22,8 +22,6 @@ from rig_identification.cli import commands
 from rig_identification.errors import InputError, MissingDescription
 
 PROGRAM = "rig-identification"
-#: Names the folder of a lab's own effects (:mod:`rig_identification.own`), which only a model loads.
-EFFECTS_FOLDER = "RIG_IDENTIFICATION_EFFECTS"
 
 SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
@@ -80,7 +78,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = build_parser().parse_args(argv)
     try:
         if arguments.effects is not None:
-            os.environ[EFFECTS_FOLDER] = arguments.effects
+            from rig_identification.own import VARIABLE  # it imports numpy, which --help needs not
+
+            os.environ[VARIABLE] = arguments.effects
         arguments.run(arguments)
     except InputError as error:
         _say(f"error: {error}")

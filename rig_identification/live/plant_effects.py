@@ -151,7 +151,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.LAW_DIRECTION : block + place.LAW_DIRECTION + 2] = effects.law_line
     physics[block + place.LAW_NARROW] = effects.law_narrow
     for k, numbers in enumerate(effects.own):
-        first = block + place.OWN + place.OWN_SIZE * k + 2
+        first = place.own_block(block, k) + place.OWN_NUMBERS
         physics[first : first + len(numbers)] = numbers
     out = elastic.with_physics(physics)
     for rider in effects.riders:

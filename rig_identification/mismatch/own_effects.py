@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.mismatch.candidate import Candidate, Told, added
-from rig_identification.model.effects.place import OWN, OWN_SIZE
+from rig_identification.model.effects.place import OWN_NUMBERS, own_block
 from rig_identification.own import OwnEffect, own_effects
 from rig_identification.rig import Rig
 
@@ -12,7 +12,7 @@ from rig_identification.rig import Rig
 def own_hypotheses(rig: Rig, mass: float, block: int) -> list[Candidate]:
     """One for each effect. mass: kg, roughly. block: first entry of the effects' block in ``physics``."""
     return [
-        _hypothesis(effect, rig, mass, block + OWN + OWN_SIZE * k + 2)
+        _hypothesis(effect, rig, mass, own_block(block, k) + OWN_NUMBERS)
         for k, effect in enumerate(own_effects())
     ]
 

@@ -17,12 +17,11 @@ from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
     LINEAR_DENSITY,
-    OWN,
-    OWN_SIZE,
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
     SHARING,
     internal_block,
+    own_block,
 )
 from rig_identification.model.integrate import accumulate, propagate
 from rig_identification.model.substeps import FINE_STEP, FIT_STEP, hanging, substeps_for
@@ -133,7 +132,7 @@ def rig_model(
     physics[layout.effects_offset(n) + LINEAR_DENSITY] = rig.cable_linear_density or 0.0
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     for k, effect in enumerate(own_effects()):
-        at = layout.effects_offset(n) + OWN + OWN_SIZE * k
+        at = own_block(layout.effects_offset(n), k)
         physics[at : at + 2] = [code.address for code in code_of(effect)]
     elastic = layout.ELASTIC_ROD if rods else layout.ELASTIC
     mode = layout.RIGID if axial_stiffness is None else elastic

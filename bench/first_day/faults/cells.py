@@ -47,15 +47,17 @@ def cases(raw: RawSession) -> Iterator[Case]:
 
 
 def _steps(raw: RawSession, held: tuple[str, ...]) -> Iterator[Case]:
-    """Converters whose steps noise does not spread over: a law that the table has no word for."""
+    """Converters whose steps noise does not spread over: a law that the table has no word for.
+
+    Only where the description tells the noise: the check measures steps by it.
+    """
+    noise = raw.rig.noise
     for steps in COARSE:
-        for label, names in one_and_all(raw, 1) if cells(raw) else ():
-            step = steps * raw.rig.noise["tension"]
-            injector = on_values(names, _rounded(step, slice(None)))
+        for label, names in one_and_all(raw, 1) if cells(raw) and "tension" in noise else ():
+            injector = on_values(names, _rounded(steps * noise["tension"], slice(None)))
             yield Case(f"cells/coarse_steps/{label}/{steps:.0f}_noise", "unknown", names, injector)
-        if "imu" in held:
-            step = steps * raw.rig.noise["specific_force"]
-            injector = on_values(("imu",), _rounded(step, IMU_FORCE))
+        if "imu" in held and "specific_force" in noise:
+            injector = on_values(("imu",), _rounded(steps * noise["specific_force"], IMU_FORCE))
             yield Case(f"cells/coarse_steps/imu/{steps:.0f}_noise", "unknown", ("imu",), injector)
 
 

@@ -46,6 +46,10 @@ class Account:
     parts: Mapping[str, float]
 
 
+#: Of what cannot be.
+IMPOSSIBLE = Account(None, (), float("inf"), {})
+
+
 @dataclass
 class Evidence:
     """Evaluations of one session under hypotheses."""
@@ -102,14 +106,14 @@ class Evidence:
             spared = most if moved else most - self._beside_rest(hypothesis.about)
             account = self._account(changed, hypothesis.loosened, self.plain, moved, spared)
             possible = account.rest is not None and hypothesis.possible(account.rest)
-            return account if possible else Account(None, (), float("inf"), {})
+            return account if possible else IMPOSSIBLE
         devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
         if hypothesis.about == {"imu.gyroscope"}:
             rest = self.plain.rest or start.rest
         else:
             rest = joined(start.rest, changed.rig, changed.at_rest, devices, hypothesis.loosened)
         if not hypothesis.possible(rest):
-            return Account(None, (), float("inf"), {})
+            return IMPOSSIBLE
         parts = {"rest": self._rest_nats(rest.square)}
         for k, run in enumerate(changed.runs[:RUNS]):
             motion = start.motions[k]
@@ -165,7 +169,7 @@ class Evidence:
         """
         rest = fit_rest(session.rig, session.at_rest, loosened)
         if rest is None:
-            return Account(None, (), float("inf"), {})
+            return IMPOSSIBLE
         parts = {"rest": self._rest_nats(rest.square)}
         if parts["rest"] > most:
             return Account(rest, (), float("inf"), parts)

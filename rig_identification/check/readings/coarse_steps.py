@@ -11,8 +11,8 @@ A law without a name: the recording contract has none for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,23 +20,15 @@ from rig_identification.check.found import Found
 from rig_identification.check.readings.channel_model import (
     Array,
     channels_of,
-    groups,
     resolution,
 )
 from rig_identification.check.readings.telling import Spotted, told, where
+from rig_identification.cleaning.channel import COLUMNS
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 
 #: Behind what repeats, is averaged or frozen: those channels have steps of their own making.
 ORDER = 60
-#: Quantities of a channel: name of their noise in the rig description, unit, axes.
-_QUANTITIES = {
-    "tension": ("tension", "N", ("",)),
-    "exciter_force": ("exciter_force", "N", ("x", "y", "z")),
-    "angular_rate": ("angular_rate", "rad/s", ("x", "y", "z")),
-    "specific_force": ("specific_force", "m/s^2", ("x", "y", "z")),
-    "inclination": ("inclination", "rad", ("x", "y")),
-}
 #: Two samples that noise does not spread over a step are the same more often than not.
 _SAME = 0.5
 #: And of the changes this share goes to a neighbouring step: a held sample jumps, noise spreads.
@@ -49,38 +41,24 @@ _FEWEST = 10
 
 def find(session: RawSession) -> tuple[Found, ...]:
     """Components that are read in steps coarser than their noise, one fault for each."""
-    spotted: dict[tuple[str, str, str], list[Spotted]] = {}
-    for (device, _), recorded in channels_of(session):
-        moving = [channel for number, channel in recorded if session.recordings[number].kind == "dynamic"]
-        for quantity, axis, column in _components([channel for _, channel in recorded]):
-            step = _step([channel.values[:, column] for channel in moving])
-            noise = session.rig.noise.get(_QUANTITIES[quantity][0], np.inf)
-            if step > np.sqrt(12.0) * noise:
-                found = [
-                    _passages(session.recordings[number], number, channel, column, step)
-                    for number, channel in recorded
-                ]
-                spotted[device, quantity, axis] = found
     out: list[Found] = []
-    for (_, quantity, axis), group in spotted.items():
-        now = out[-1].session if out else session
-        # Two components of one channel may be concerned: each keeps what the other one changed
-        fresh = [_onto(now.recordings[one.recording], one) for one in group]
-        out += told(now, [fresh], lambda left, one: _fault(left, one, quantity, axis))  # noqa: B023
+    for (_, name), recorded in channels_of(session):
+        moving = [channel for number, channel in recorded if session.recordings[number].kind == "dynamic"]
+        for column, (_, quantity, axis, unit) in enumerate(COLUMNS.get(name, ())):
+            step = _step([channel.values[:, column] for channel in moving])
+            noise = session.rig.noise.get(quantity if name == "imu" else name, np.inf)
+            if step > np.sqrt(12.0) * noise:
+                now = out[-1].session if out else session
+                # As they are now: another component of the same channel may have been changed
+                channels = [(n, _same(now.recordings[n], channel)) for n, channel in recorded]
+                spotted = [_passages(n, channel, column, step) for n, channel in channels]
+                fault = partial(_fault, quantity=quantity, axis=axis, unit=unit, noise=noise)
+                out += told(now, [spotted], fault)
     return tuple(out)
 
 
-def _components(channels: list[RawChannel]) -> Iterator[tuple[str, str, int]]:
-    """Quantity, axis and column of what varies in any recording of a channel."""
-    known: dict[str, set[int]] = {}
-    for channel in channels:
-        for quantity, varying in groups(channel).items():
-            known.setdefault(quantity, set()).update(varying)
-    for quantity, columns in known.items():
-        if quantity in _QUANTITIES:
-            axes = _QUANTITIES[quantity][2]
-            first = 3 if quantity == "specific_force" else 0
-            yield from ((quantity, axes[k - first], k) for k in sorted(columns))
+def _same(recording: RawRecording, channel: RawChannel) -> RawChannel:
+    return next(c for c in recording.channels if c.topic == channel.topic)
 
 
 def _step(columns: list[Array]) -> float:
@@ -97,7 +75,7 @@ def _step(columns: list[Array]) -> float:
     return step if np.mean(change[passed] < 1.5 * step) > _NEIGHBOURS else 0.0
 
 
-def _passages(recording: RawRecording, number: int, channel: RawChannel, column: int, step: float) -> Spotted:
+def _passages(number: int, channel: RawChannel, column: int, step: float) -> Spotted:
     """The channel with the sample next to each passage half-way between the steps, and no others."""
     values = channel.values.copy()
     values[:, column] = _halfway(channel.values[:, column], step)
@@ -131,17 +109,11 @@ def _halfway(column: Array, step: float) -> Array:
     return out
 
 
-def _onto(recording: RawRecording, one: Spotted) -> Spotted:
-    """What was spotted, on the channel as it is now: columns that it does not concern stay."""
-    now = next(c for c in recording.channels if c.topic == one.changed.topic)
-    kept = np.isfinite(one.changed.values) & np.isfinite(now.values)
-    return replace(one, changed=replace(one.changed, values=np.where(kept, one.changed.values, np.nan)))
-
-
-def _fault(session: RawSession, group: list[Spotted], quantity: str, axis: str) -> SetupFault:
-    name, unit, _ = _QUANTITIES[quantity]
-    step, noise = group[0].value, session.rig.noise[name]
-    place = where(session, group) | {"axis": axis or None, "quantity": quantity, "law": "steps"}
+def _fault(
+    session: RawSession, group: list[Spotted], quantity: str, axis: str | None, unit: str, noise: float
+) -> SetupFault:
+    step = group[0].value
+    place = where(session, group) | {"axis": axis, "quantity": quantity, "law": "steps"}
     what = quantity.replace("_", " ") + (f" along {axis}" if axis else "")
     return SetupFault(
         "unknown", place, {"step": {"value": step, "std": 0.0, "unit": unit}},

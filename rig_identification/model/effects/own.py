@@ -15,7 +15,7 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
 from numba.extending import intrinsic
 
-from rig_identification.model.effects.place import OWN, OWN_SIZE, active
+from rig_identification.model.effects.place import OWN_NUMBERS, OWN_SIZE, active, own_block
 from rig_identification.own import MOST_EFFECTS, MOST_NUMBERS, OwnEffect
 
 _WORDS = types.void(types.int64, types.int64, types.int64, types.int64)
@@ -68,13 +68,20 @@ def _code(law: Any, kind: Any) -> Any:
 
 
 @njit(cache=True, inline="always")
+def _asked(physics, first):  # type: ignore[no-untyped-def]
+    """Whether any number of the effect at entry ``first``, or its derivative, is asked for."""
+    found = False
+    for i in range(first + OWN_NUMBERS, first + OWN_SIZE):
+        found = found or active(physics[i])
+    return found
+
+
+@njit(cache=True, inline="always")
 def own_active(physics, block):  # type: ignore[no-untyped-def]
     """Whether any effect of the lab's own is asked for."""
     found = False
     for k in range(MOST_EFFECTS):
-        first = block + OWN + OWN_SIZE * k
-        for i in range(first + 2, first + OWN_SIZE):
-            found = found or active(physics[i])
+        found = found or _asked(physics, own_block(block, k))
     return found
 
 
@@ -83,14 +90,11 @@ def add_own(physics, block, x, R, r):  # type: ignore[no-untyped-def]
     """Add the wrench of each effect that has a number to r."""
     wrench = np.zeros(6, physics.dtype)
     for k in range(MOST_EFFECTS):
-        first = block + OWN + OWN_SIZE * k
-        asked = False
-        for i in range(first + 2, first + OWN_SIZE):
-            asked = asked or active(physics[i])
+        first = own_block(block, k)
         code = physics[first if wrench.itemsize == 8 else first + 1].real
-        if not asked or code == 0.0:
+        if code == 0.0 or not _asked(physics, first):
             continue
-        numbers = physics[first + 2 : first + OWN_SIZE]
+        numbers = physics[first + OWN_NUMBERS : first + OWN_SIZE]
         wrench[:] = 0.0
         _call(np.int64(code), numbers.ctypes.data, x.ctypes.data, R.ctypes.data, wrench.ctypes.data)  # type: ignore[call-arg]
         for i in range(6):

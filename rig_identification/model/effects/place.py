@@ -43,16 +43,21 @@ LAW_DIRECTION = 57  # 2: rad, azimuth and elevation of the spring's line in the 
 LAW_NARROW = 59  # 1/m^2: how fast the brake fades away from where its point hangs at rest
 TETHER_DAMPING = 60  # N s/m, along a taut tether
 TETHER_PRELOAD = 61  # N: pull of a taut tether at rest, beside what TETHER_PULL has along it
-OWN = (
-    62  # MOST_EFFECTS times OWN_SIZE: effects of the lab's own (own.py), two addresses and their numbers each
-)
-OWN_SIZE = 2 + MOST_NUMBERS
+OWN = 62  # MOST_EFFECTS times OWN_SIZE: effects of the lab's own (own.py): two addresses, then its numbers
+OWN_NUMBERS = 2  # within such an effect's entries
+OWN_SIZE = OWN_NUMBERS + MOST_NUMBERS
 EFFECTS_SIZE = OWN + MOST_EFFECTS * OWN_SIZE
 
 
 def effects_block(cables: int) -> int:
     """First entry of the effects' block."""
     return CABLES + CABLE_SIZE * cables
+
+
+@njit(cache=True, inline="always")
+def own_block(block, number):  # type: ignore[no-untyped-def]
+    """First entry of the lab's own effect ``number``; block: first entry of the effects' block."""
+    return block + OWN + OWN_SIZE * number
 
 
 def internal_block(cables: int, number: int) -> int:
