@@ -190,6 +190,16 @@ class Run:
         cut_off = replace(self, grid=grid, channels=tuple(cut), force=force, offset=offset, unknown=())
         return cut_off if cut_off.watched else replace(cut_off, R_tracker_mean=None)
 
+    def with_wide_nodes(self) -> Run:
+        """The same run with every second node; samples nearest the same node are averaged together."""
+        grid = Grid(2.0 * self.grid.step, (self.grid.nodes + 1) // 2)
+        channels = []
+        for channel in self.channels:
+            group, node = group_by_node(grid, channel.time)
+            channels.append(replace(channel, group=group, node=node))
+        force = None if self.force is None else self.force.at_every_second(grid.nodes)
+        return replace(self, grid=grid, channels=tuple(channels), force=force)
+
     def where_driven(self) -> tuple[Run, ...]:
         """The run's parts between stretches in which its force is not known, from its first reading on."""
         heard = min((float(c.time[0]) for c in self.channels), default=0.0)

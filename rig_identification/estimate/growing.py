@@ -18,6 +18,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Bench, Linearised
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import (
+    PATIENCE,
     POLISH,
     Evaluation,
     Point,
@@ -41,8 +42,10 @@ HOLD = 0.1
 HOPELESS_SQUARE = 2.0
 #: Mean square residual below which what a fit lacks is so small that first order tells it.
 NEAR_SQUARE = 1.3
-#: Steps of the whole run's fit; fewer where a shorter horizon was hopeless: they only say how far off it is.
+#: Steps of the whole run's fit, and evaluations that each may take on average; fewer where a shorter horizon was
+#: hopeless: they only say how far off it is.
 STEPS, HOPELESS_STEPS = 20, 5
+HOPELESS_PATIENCE = 1.0
 
 
 class OutOfReach(FloatingPointError):
@@ -114,6 +117,7 @@ def solve_growing(
             # Bites only where much stays unexplained; a short hopeless horizon still says where to go
             polish=POLISH if whole or hopeless else 0.0,
             tolerance=1e-3 if whole else 0.5,
+            patience=HOPELESS_PATIENCE if whole and hopeless else PATIENCE,
             notify=None if notify is None else _at(notify, end, duration),
         )
         if whole and not converged and misfit(evaluation) < HOPELESS_SQUARE:

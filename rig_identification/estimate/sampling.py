@@ -166,7 +166,7 @@ class SmoothInput:
 
     spline: CubicSpline  # of s after the first node of the whole recording, (w,)
     step: float  # s between nodes
-    first: int  # node of the recording that the input's own first node is
+    first: float  # node of the recording that the input's own first node is; between two of wide nodes
     nodes: int
 
     def at(self, late: float, order: int = 0, between: float = 0.0) -> Array:
@@ -209,6 +209,17 @@ class NodeInput:
             self.cutoff,
             self.rate_noise,
         )
+
+    def at_every_second(self, nodes: int) -> NodeInput:
+        """The same input at every second node, of which there are so many."""
+        between = self.values[1::2][: nodes - 1]
+        values = self.values[::2]
+        middle = np.zeros_like(values)
+        middle[: len(between)] = between - 0.5 * (values[:-1] + values[1:])[: len(between)]
+        jumps = self.jumps[::2].copy()
+        jumps[: len(self.jumps[1::2])] += self.jumps[1::2]
+        smooth = replace(self.smooth, step=2.0 * self.smooth.step, first=self.smooth.first / 2, nodes=nodes)
+        return replace(self, values=values, middle=middle, smooth=smooth, jumps=jumps, doubt=self.doubt[::2])
 
     def late_by(self, late: float) -> tuple[Array, Array, Array, Array]:
         """(nodes, w) each: the input ``late`` seconds after each node, midway, its rate, that rate's rate.

@@ -33,7 +33,7 @@ from rig_identification.mismatch.trial import (
     promised,
 )
 from rig_identification.model.motion import State
-from rig_identification.search.ladder import STAYING, Rung, fitted_at, walked_down
+from rig_identification.search.ladder import REACHED, STAYING, Rung, fitted_at, walked_down
 from rig_identification.search.laws import promised_laws
 from rig_identification.search.path import beside
 
@@ -44,8 +44,6 @@ Say = Callable[[str], None]
 FITTED, ALIKE, WALKED = 5, 2, 3
 #: Share of the best promise that another one has to come to.
 SHARE = 0.1
-#: Share of what another one has promised and gained: first order is right within a factor of two.
-REACHED = 0.5
 #: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole, and the
 #: share of that which counts as the larger part.
 SEEN, CHIEF = 4.0, 0.5
@@ -60,7 +58,7 @@ MEANT = 3.0
 FIRST_STEPS = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Standing:
     """Effects in the model, and the model at its own level."""
 

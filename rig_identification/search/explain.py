@@ -103,8 +103,7 @@ def _explain(
     outcome = search(ideal, first, notify, budget, heard)
     if outcome.told is not None or watched:
         return outcome.told
-    rung = outcome.likeliest.rung
-    seen(outcome.first.rung if rung.alone else rung)
+    seen(outcome.rung)
     found = _beside(ideal, outcome, rest_explained, notify, budget)
     if found is not None or part:
         return found
@@ -134,5 +133,6 @@ def _beside(
     if budget.spent() or not outcome.likeliest.found:
         return None
     event = None if outcome.partly is None else event_beside(outcome.partly)
-    event = event or standing_out(outcome.likeliest.rung)
+    if event is None and not outcome.likeliest.rung.alone:
+        event = standing_out(outcome.rung)
     return None if event is None else explained_outside(ideal, event, rest_explained, notify, chief=False)

@@ -39,6 +39,8 @@ SHORTER = (1.0, 0.3, 0.1)
 JITTER = 1.0
 #: Mean square residual from which a motion is lost: a wrench half a decade too weak multiplies it by ten.
 LOST = 30.0
+#: Share of what a step promises that it gains at least: first order is right within a factor of two.
+REACHED = 0.5
 #: Steps of the fit of a model alone.
 ALONE_STEPS = 20
 
@@ -110,13 +112,18 @@ def walked_down(problem: Problem, point: Point, level: int) -> Rung | None:
     # Where it leaves something after all the leap may have led into another valley
     while best.level < ALONE:
         weaker = fitted_at(problem, best.evaluation.point, best.level + 1, PASSING)
-        if weaker is not None and weaker.evidence < best.evidence:
+        if weaker is not None and weaker.evidence < best.evidence < _at_best(weaker):
             # Only where a fit to its end says so is a weaker wrench less likely
             weaker = fitted_at(problem, weaker.evaluation.point, weaker.level, STAYING)
         if weaker is None or weaker.evidence < best.evidence:
             break
         best = weaker
     return best if leapt is None or best.evidence > leapt.evidence else leapt
+
+
+def _at_best(rung: Rung) -> float:
+    """Evidence that further steps may come to: what is promised is right within a factor of two."""
+    return rung.evidence + (rung.within_reach - rung.evidence) / REACHED
 
 
 def _alone_at_once(rung: Rung) -> Rung | None:

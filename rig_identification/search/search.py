@@ -7,7 +7,8 @@ own level of the discrepancy; where a first effect only stood in for another one
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import Ideal, only_watched
@@ -20,6 +21,7 @@ from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.expand import MEANT, Standing, children
 from rig_identification.search.ladder import Rung, begun, climbed
 from rig_identification.search.levels import ALONE
+from rig_identification.search.stretch import over_all, stretch_of
 from rig_identification.search.whole import MOST_EFFECTS, in_whole_runs
 
 Notify = Callable[[str, float], None]
@@ -38,9 +40,16 @@ class Outcome:
     """What a search came to."""
 
     first: Standing  # without any effect
+    whole: Rung  # ... over whole runs
     likeliest: Standing
     told: Explained | None  # what explains the session, but for a trace perhaps
     partly: Explained | None  # whole runs with the likeliest effects, where they explain a part
+
+    @cached_property
+    def rung(self) -> Rung:
+        """The likeliest model that needs a wrench, over whole runs; without any effect where that needs none."""
+        best = self.likeliest
+        return self.whole if best.rung.alone else over_all(self.whole, best.found, best.rung)
 
 
 def first_rung(ideal: Ideal) -> Rung | None:
@@ -75,13 +84,14 @@ def search(
     """
     problem = problem_of(ideal)
     candidates = catalogue(problem)
-    start = Standing(first)
+    start = Standing(first if first.alone else stretch_of(first))
+    looked_at, whole = replace(problem, runs=start.rung.problem.runs), first
     queue, idle = [start], {id(start): 0}
     likeliest, told, partly = start, None, None
     for turn in range(EXPANDED):
         if turn == 1 and start.rung.alone and not only_watched(problem) and not budget.spent():
             # What no number explains at first order may be a force that has no name
-            start = Standing(climbed(start.rung))
+            start = Standing(whole := climbed(start.rung))
             queue += [] if start.rung.alone else [start]
             idle[id(start)] = 0
             likeliest = max(likeliest, start, key=lambda s: s.evidence)
@@ -96,7 +106,7 @@ def search(
         def say(label: str, turn: int = turn) -> None:
             notify(f"search: {label}", (turn + 0.5) / (EXPANDED + 1))
 
-        every = children(problem, standing, candidates, budget, say, None if turn else promises)
+        every = children(looked_at, standing, candidates, budget, say, None if turn else promises)
         every = [child for child in every if child.evidence > standing.evidence + MEANT]
         if not every:
             continue
@@ -106,7 +116,7 @@ def search(
         if best.rung.level >= NEARLY_ALONE:
             found = in_whole_runs(ideal, problem, best, every[1:], candidates, budget, say, heard)
             if found is not None and found.wholly:
-                return Outcome(start, best, found, found)
+                return Outcome(start, whole, best, found, found)
             if found is not None and found.told:
                 told = found
             if likeliest is best:
@@ -116,4 +126,4 @@ def search(
             idle[id(child)] = idle[id(standing)] + 1 if stays else 0
             if len(child.found) < MOST_EFFECTS and idle[id(child)] < IDLE:
                 queue.append(child)
-    return Outcome(start, likeliest, told, partly)
+    return Outcome(start, whole, likeliest, told, partly)

@@ -43,11 +43,11 @@ def unexplained(ideal: Ideal, outcome: Outcome, budget: Budget, notify: Notify) 
     fitted, explanation = ideal.fitted, ideal.mismatch.explanation
     kept: tuple[Finding, ...] = ()
     alternatives: tuple[dict[str, object], ...] = ()
-    rung, looseness = outcome.first.rung, hear(ideal.fitted).looseness
+    rung, looseness = outcome.whole, hear(ideal.fitted).looseness
     if partly is not None:
         fitted, kept = partly.fitted, partly.mismatch.findings
         explanation, alternatives = partly.mismatch.explanation, partly.mismatch.alternatives
-        rung, looseness = likeliest.rung, hear(partly.fitted).looseness
+        rung, looseness = outcome.rung, hear(partly.fitted).looseness
     elif likeliest.found:
         alternatives = tuple(rival(likeliest.trial(c), 0.0) for c in likeliest.found)
         named = ", ".join(called(c.effect, c.where) for c in likeliest.found)
