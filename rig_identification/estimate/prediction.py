@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, random_wrench
-from rig_identification.estimate.lag import lagged, unsettled
+from rig_identification.estimate.lag import lagged, settling_cost, unsettled
 from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
@@ -300,7 +300,7 @@ def linearise_run(
     H, D = np.empty((size, motion.states.shape[1])), np.empty((size, 6))
     columns = np.empty((size, 1 + known + starts))
     readings: dict[str, sensors.Reading] = {}
-    first = 0
+    first, settled = 0, 0.0
     for index, channel in enumerate(run.channels):
         if channel.device not in readings:
             readings[channel.device] = read_device(
@@ -310,7 +310,9 @@ def linearise_run(
             bench, run, index, motion, readings[channel.device], own, shown[index], in_physics, start_only
         )
         tau = float(own[parameters.places.lag(channel.device)])
-        spread = channel.grouped_variance + unsettled(run.grid.step, tau, channel.node, channel.grouped)
+        settling = unsettled(run.grid.step, tau, channel.node, channel.grouped)
+        settled += settling_cost(channel.grouped_variance, settling)
+        spread = channel.grouped_variance + settling
         here = places[first : first + spread.size]
         first += spread.size
         axis[here] = np.tile(channel.axes, channel.node.size)
@@ -340,7 +342,7 @@ def linearise_run(
     return Linearised(
         columns[:, 0],
         whitened,
-        log_spread,
+        log_spread + settled,
         motion,
         at,
         which,

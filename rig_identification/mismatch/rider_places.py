@@ -2,7 +2,7 @@
 
 A tank at the end of a vehicle feels another acceleration than one in its middle: a scan that lets riders feel
 the middle's found a part of 16 kg only with a negative mass (bench/concealed/sealed_run_10, 10834). The first
-scan goes over frequencies a tenth apart and one damping. Half a minute of a liquid that swings freely tells
+scan goes over frequencies a twentieth apart and one damping. Half a minute of a liquid that swings freely tells
 its frequency to less than a percent.
 """
 
@@ -40,6 +40,8 @@ Array = NDArray[np.float64]
 COARSE = tuple(float(f) for f in np.geomspace(0.9, 1.11, 9))
 FINE = tuple(float(f) for f in np.geomspace(0.985, 1.015, 5))
 DAMPINGS = (0.006, 0.03, 0.12)
+#: Frequencies that are tried at once, and those of a part that moves along all axes.
+AT_ONCE, SPARSE = 12, FREQUENCIES[::2]
 #: Places lie within so much of ``spread_of`` about the middle.
 REACH = 1.2
 
@@ -55,33 +57,31 @@ class Ridden:
     runs: list[Array]  # (m, TERMS) its columns in every run
 
 
-def along_each(problem: Problem, beyond: Beyond) -> dict[str, list[Array]]:
-    """(m, TERMS F) what a kilogram at every frequency does to every run's samples, by its axis."""
-    return {axis: _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,)) for axis in AXES}
+def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
+    """Every swing where it explains most, as far as any mass of it promises something. mass: kg, of the body.
 
-
-def scanned(beyond: Beyond, alone: dict[str, list[Array]], mass: float) -> Iterator[Ridden]:
-    """Every swing where it explains most, as far as any mass of it promises something.
-
-    alone: of :func:`along_each`. mass: kg, of the body.
+    A few frequencies at once: all of them together would fill the memory.
     """
-    for directions, axes in DIRECTIONS.items():
-        responses = alone[axes[0]]
-        for axis in axes[1:]:
-            responses = [a + b for a, b in zip(responses, alone[axis], strict=True)]
-        found = beyond.of(responses)
-        for k, frequency in enumerate(FREQUENCIES):
-            ridden = _ridden(Swing(directions, frequency), DAMPING, k, found, responses, mass)
-            if ridden is not None:
-                yield ridden
+    for first in range(0, len(FREQUENCIES), AT_ONCE):
+        frequencies = FREQUENCIES[first : first + AT_ONCE]
+        alone = {axis: _responses(problem, beyond, axis, frequencies, (DAMPING,)) for axis in AXES}
+        for directions, axes in DIRECTIONS.items():
+            responses = alone[axes[0]]
+            for axis in axes[1:]:
+                responses = [a + b for a, b in zip(responses, alone[axis], strict=True)]
+            found = beyond.of(responses)
+            for k, frequency in enumerate(frequencies):
+                ridden = _ridden(Swing(directions, frequency), DAMPING, k, found, responses, mass)
+                if ridden is not None:
+                    yield ridden
 
 
-def on_springs_all_ways(beyond: Beyond, alone: dict[str, list[Array]], mass: float) -> Ridden | None:
+def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden | None:
     """A part on springs that moves along all three axes, each with the frequency that explains most.
 
-    One frequency after the other, from the axis that explains most by itself. alone: of :func:`along_each`.
-    mass: kg, of the body.
+    One frequency after the other, from the axis that explains most by itself. mass: kg, of the body.
     """
+    alone = {axis: _responses(problem, beyond, axis, SPARSE, (DAMPING,)) for axis in AXES}
     columns = {axis: beyond.of(responses) for axis, responses in alone.items()}
 
     def of(chosen: dict[str, int]) -> Ridden | None:
@@ -96,8 +96,8 @@ def on_springs_all_ways(beyond: Beyond, alone: dict[str, list[Array]], mass: flo
             np.sum([alone[a][i][:, part] for a, part in parts.items()], axis=0)
             for i in range(len(beyond.full.runs))
         ]
-        along = tuple(FREQUENCIES[chosen.get(a, 0)] for a in AXES)
-        swing = Swing("".join(AXES), min(FREQUENCIES[k] for k in chosen.values()), along)
+        along = tuple(SPARSE[chosen.get(a, 0)] for a in AXES)
+        swing = Swing("".join(AXES), min(SPARSE[k] for k in chosen.values()), along)
         return _ridden(swing, DAMPING, 0, both, responses, mass)
 
     chosen: dict[str, int] = {}
@@ -107,7 +107,7 @@ def on_springs_all_ways(beyond: Beyond, alone: dict[str, list[Array]], mass: flo
             (of(chosen | {axis: k}), axis, k)
             for axis in AXES
             if axis not in chosen
-            for k in range(len(FREQUENCIES))
+            for k in range(len(SPARSE))
         ]
         likely = [(found.best.gain, axis, k) for found, axis, k in tried if found is not None]
         if not likely:
@@ -160,7 +160,13 @@ def _ridden(
         1.0,
         REACH,
     )
-    return None if best is None else Ridden(swing, damping, best, columns, own)
+    return None if best is None else Ridden(swing, damping, best, columns, [o.copy() for o in own])
+
+
+def columns_of(problem: Problem, beyond: Beyond, ridden: Ridden) -> list[Array]:
+    """(m, TERMS) what a rider's kilogram does to every run's samples, by place."""
+    swing = ridden.swing
+    return _responses(problem, beyond, swing.directions, (swing.frequency,), (ridden.damping,))
 
 
 def finer(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden | None:

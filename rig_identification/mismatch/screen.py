@@ -26,8 +26,8 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.rider_places import (
     Ridden,
-    along_each,
     finer,
+    columns_of,
     on_springs_all_ways,
     other_ways,
     scanned,
@@ -51,8 +51,9 @@ from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
-#: Directions of riders that are looked at more finely, best first.
-FINER = 2
+#: Share of the best promise down to which a scanned swing keeps its columns, which fill the memory: of another one
+#: they are computed again where it is asked for.
+KEPT = 0.5
 #: Share of the best promise of an effect that another one of the same has to come to, to be fitted as well.
 ELSEWHERE = 0.8
 
@@ -214,25 +215,21 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     """The best swing of each direction, of effects that are not in the model already."""
     taken = {p.name for p in problem.bench.parameters.free}
     found: dict[tuple[str, str], list[Ridden]] = {}
-    alone = along_each(problem, beyond)
-    for ridden in scanned(beyond, alone, mass):
+    for ridden in scanned(problem, beyond, mass):
         effect = ridden.swing.effect
         # A second one of an effect would write its numbers over the first one's
         if f"{effect}.mass" not in taken:
-            found.setdefault((effect, ridden.swing.directions), []).append(ridden)
+            swings = found.setdefault((effect, ridden.swing.directions), [])
+            most = max([ridden.best.gain, *(r.best.gain for r in swings)])
+            swings.append(ridden if ridden.best.gain > KEPT * most else replace(ridden, runs=[]))
     every = None
     if problem.discrepancy is not None and "sprung_mass.mass" not in taken:
-        every = on_springs_all_ways(beyond, alone, mass)
+        every = on_springs_all_ways(problem, beyond, mass)
     best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
     all_ways = [] if every is None else [_ridden_promise(problem, beyond, every, mass)]
     return [
-        *(
-            _with_elsewhere(
-                [_best_near(problem, beyond, peak, mass) for peak in peaks] if k < FINER else peaks
-            )
-            for k, peaks in enumerate(best)
-        ),
+        *(_with_elsewhere([_best_near(problem, beyond, peak, mass) for peak in peaks]) for peaks in best),
         *all_ways,
     ]
 
@@ -296,7 +293,8 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
     """What a scanned rider promises; near the noise, what of it a motion accounts for."""
     best, gain = found.best, found.best.gain
     if misfit(beyond.full) < NEAR_SQUARE:
-        gain -= _unearned(problem, beyond, found.columns, best.weights, found.runs)
+        runs = found.runs or columns_of(problem, beyond, found)
+        gain -= _unearned(problem, beyond, found.columns, best.weights, runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
     if len(found.swing.directions) == 1:

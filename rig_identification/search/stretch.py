@@ -1,8 +1,9 @@
-"""As much of each run as tells large effects apart: far from the noise the search looks at a stretch of it.
+"""As much of each run as tells large effects apart: far from the noise the search looks at its first part.
 
 What takes a wrench to be followed is told by thousands of nats over half a minute, and a search asks for ten.
-A third of each run tells the same hypotheses apart, at a third of the work. The stretch is the one in which the
-missing wrench is strongest: what the ideal model leaves out shows there most. Whole runs then judge what was
+A third of each run tells the same hypotheses apart, at a third of the work. It is the first part, for how a
+run begins is known best: what swings within the body, follows slowly or creeps is at rest in most, and a start
+in the middle of it would be one more unknown. Where the missing wrench begins late the part is longer. Whole runs then judge what was
 found (whole.py), and the body's interval comes from all of them (:func:`over_all`).
 """
 
@@ -12,8 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig_identification.estimate.evidence import WIDE_NODE_STEP, Run
-from rig_identification.estimate.solve import Point
+from rig_identification.estimate.evidence import MARGIN, WIDE_NODE_STEP, Run
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.screen import carried, extended
 from rig_identification.search.ladder import PASSING, STAYING, Rung, fitted_at
@@ -25,23 +25,22 @@ SECONDS = 12.0
 
 
 def stretch_of(rung: Rung) -> Rung:
-    """A model with a wrench on the stretch of each run in which that is strongest; itself where runs are short."""
+    """A model with a wrench on the first part of each run; itself where runs are short."""
     if rung.problem.discrepancy is None:
         return rung
     size = np.sqrt(np.diag(rung.problem.discrepancy.covariance))
-    runs, starts, latents = [], [], []
+    runs, latents = [], []
     for run, linearised in zip(rung.problem.runs, rung.evaluation.runs, strict=True):
-        nodes = min(run.grid.nodes, round(SECONDS / run.grid.step) + 1)
-        so_far = np.concatenate([[0.0], np.cumsum(np.sum((linearised.latent / size) ** 2, axis=1))])
-        first = int(np.argmax(so_far[nodes:] - so_far[: so_far.size - nodes]))
-        part = _with_wide_nodes(run.between(first, first + nodes - 1))
+        seen = np.cumsum(np.sum((linearised.latent / size) ** 2, axis=1))
+        last = max(SECONDS / run.grid.step, np.searchsorted(seen, seen[-1] * SECONDS / run.grid.duration))
+        part = _with_wide_nodes(run.between(0, int(last), margin=MARGIN))
         runs.append(part)
-        starts.append(linearised.motion.state(first))
-        latents.append(linearised.latent[first : first + nodes : round(part.grid.step / run.grid.step)])
+        stride = round(part.grid.step / run.grid.step)
+        latents.append(linearised.latent[: int(last) + 1 : stride][: part.grid.nodes])
     if sum(run.grid.nodes for run in runs) == _length(rung):
         return rung
     part = replace(rung.model, runs=tuple(runs))
-    point = Point(rung.evaluation.point.theta, tuple(starts), rung.evaluation.point.rest_guesses, tuple(latents))
+    point = replace(rung.evaluation.point, latents=tuple(latents))
     return fitted_at(part, point, rung.level, PASSING) or rung
 
 
