@@ -42,8 +42,8 @@ HOLD = 0.1
 HOPELESS_SQUARE = 2.0
 #: Mean square residual below which what a fit lacks is so small that first order tells it.
 NEAR_SQUARE = 1.3
-#: Steps of the whole run's fit, and evaluations that each may take on average; fewer where a shorter horizon was
-#: hopeless: they only say how far off it is.
+#: Steps of the whole run's fit, and evaluations that each may take on average; fewer where a shorter horizon
+#: was hopeless: they only say how far off it is.
 STEPS, HOPELESS_STEPS = 20, 5
 HOPELESS_PATIENCE = 1.0
 

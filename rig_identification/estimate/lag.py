@@ -38,12 +38,12 @@ def unsettled(step: float, tau: float, node: NDArray[np.int64], values: Array) -
 
 
 def settling_cost(variance: Array, unsettled: Array) -> float:
-    """Negative log likelihood (nats) that ``unsettled`` variance (g, w) beside noise of ``variance`` stands for.
+    """Negative log likelihood (nats) of variance (g, w) ``unsettled`` beside noise of ``variance`` (g, w).
 
-    What a device showed before the run is one unknown of each of its axes, e exp(-t/tau). Every sample that it
-    touches is left out of the fit for the sake of that one. A sample that is left out takes its half square of
-    noise and its log spread out of the cost. So both are put back, and one unknown costs the log of how much
-    sharper than beforehand all samples together know it (Laplace).
+    What a device showed before the run is one unknown of each of its axes, e exp(-t/tau). Every sample that
+    it touches is left out of the fit for the sake of that one. A sample that is left out takes its half
+    square of noise and its log spread out of the cost. So both are put back, and one unknown costs the log of
+    how much sharper than beforehand all samples together know it (Laplace).
     """
     share = unsettled / variance
     left_out = 0.5 * np.sum(share / (1.0 + share) - np.log1p(share))

@@ -2,8 +2,8 @@
 
 A tank at the end of a vehicle feels another acceleration than one in its middle: a scan that lets riders feel
 the middle's found a part of 16 kg only with a negative mass (bench/concealed/sealed_run_10, 10834). The first
-scan goes over frequencies a twentieth apart and one damping. Half a minute of a liquid that swings freely tells
-its frequency to less than a percent.
+scan goes over frequencies a twentieth apart and one damping. Half a minute of a liquid that swings freely
+tells its frequency to less than a percent.
 """
 
 from __future__ import annotations

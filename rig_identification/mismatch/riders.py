@@ -30,9 +30,9 @@ from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Frequencies (Hz) at which a rider is looked for, and the damping ratio it is looked for with. Its resonance is
-#: 2 DAMPING of its frequency wide; none lies farther than half of that from one of these. At twice the spacing
-#: a liquid that hardly loses any swing promised a quarter of what it promises at its own frequency.
+#: Frequencies (Hz) at which a rider is looked for, and the damping ratio it is looked for with. Its resonance
+#: is 2 DAMPING of its frequency wide; none lies farther than half of that from one of these. At twice the
+#: spacing a liquid that hardly loses any swing promised a quarter of what it promises at its own frequency.
 DAMPING = 0.03
 FREQUENCIES = tuple(float(f) for f in np.geomspace(0.3, 9.0, 71))
 #: Directions of a part on springs, and of a liquid's surface: it swings to all sides.

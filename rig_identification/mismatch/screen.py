@@ -26,8 +26,8 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.rider_places import (
     Ridden,
-    finer,
     columns_of,
+    finer,
     on_springs_all_ways,
     other_ways,
     scanned,
@@ -51,8 +51,8 @@ from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
-#: Share of the best promise down to which a scanned swing keeps its columns, which fill the memory: of another one
-#: they are computed again where it is asked for.
+#: Share of the best promise down to which a scanned swing keeps its columns, which fill the memory: of
+#: another one they are computed again where it is asked for.
 KEPT = 0.5
 #: Share of the best promise of an effect that another one of the same has to come to, to be fitted as well.
 ELSEWHERE = 0.8

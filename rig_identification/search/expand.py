@@ -131,8 +131,9 @@ def children(
 def _gain(standing: Standing, child: Standing) -> float:
     """What a model with one more effect gains beside the same wrench.
 
-    Alone they compare otherwise: a device that follows slowly trailed one whose clock is late by 67 nats beside
-    a wrench, and led by 15 without (bench/concealed, 22002). But for a factor of two first order is right.
+    Alone they compare otherwise: a device that follows slowly trailed one whose clock is late by 67 nats
+    beside a wrench, and led by 15 without (bench/concealed, 22002). But for a factor of two first order is
+    right.
     """
     return child.rung.within_reach - standing.rung.evidence
 

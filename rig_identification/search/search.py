@@ -47,7 +47,7 @@ class Outcome:
 
     @cached_property
     def rung(self) -> Rung:
-        """The likeliest model that needs a wrench, over whole runs; without any effect where that needs none."""
+        """The likeliest model with a wrench, over whole runs; without any effect where that needs none."""
         best = self.likeliest
         return self.whole if best.rung.alone else over_all(self.whole, best.found, best.rung)
 

@@ -2,9 +2,10 @@
 
 What takes a wrench to be followed is told by thousands of nats over half a minute, and a search asks for ten.
 A third of each run tells the same hypotheses apart, at a third of the work. It is the first part, for how a
-run begins is known best: what swings within the body, follows slowly or creeps is at rest in most, and a start
-in the middle of it would be one more unknown. Where the missing wrench begins late the part is longer. Whole runs then judge what was
-found (whole.py), and the body's interval comes from all of them (:func:`over_all`).
+run begins is known best: what swings within the body, follows slowly or creeps is at rest in most, and a
+start in the middle of it would be one more unknown. Where the missing wrench begins late the part is longer.
+Whole runs then judge what was found (whole.py), and the body's interval comes from all of them
+(:func:`over_all`).
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from rig_identification.mismatch.screen import carried, extended
 from rig_identification.search.ladder import PASSING, STAYING, Rung, fitted_at
 from rig_identification.search.path import beside
 
-#: Length of the stretch (s): four or more swings of the slowest rigid mode of such rigs (0.37 Hz and up), so that
-#: what follows displacement, velocity and acceleration parts from each other and from where the run began.
+#: Length of the stretch (s): four or more swings of the slowest rigid mode of such rigs (0.37 Hz and up), so
+#: that what follows displacement, velocity and acceleration parts from each other and from where the run
+#: began.
 SECONDS = 12.0
 
 
@@ -47,7 +49,8 @@ def stretch_of(rung: Rung) -> Rung:
 def over_all(whole: Rung, found: tuple[Candidate, ...], part: Rung) -> Rung:
     """A model that was fitted to a stretch, over whole runs; as it is where it cannot be followed there.
 
-    whole: the ideal model over whole runs. part: the model with the effects ``found``, at a level with a wrench.
+    whole: the ideal model over whole runs. part: the model with the effects ``found``, at a level with a
+    wrench.
     """
     if part.alone or _length(part) == _length(whole):
         return part
