@@ -80,6 +80,7 @@ def searched(
 
     monkeypatch.setattr(queue, "children", children)
     monkeypatch.setattr(queue, "in_whole_runs", in_whole_runs)
+    monkeypatch.setattr(queue, "stretch_of", lambda rung: rung)
     monkeypatch.setattr(queue, "problem_of", lambda ideal: None)
     monkeypatch.setattr(queue, "catalogue", lambda problem: [_candidate("a")])
     first = _Rung(0.0, 0)

@@ -84,8 +84,8 @@ def search(
     """
     problem = problem_of(ideal)
     candidates = catalogue(problem)
-    start = Standing(first if first.alone else stretch_of(first))
-    looked_at, whole = replace(problem, runs=start.rung.problem.runs), first
+    start, whole = Standing(first if first.alone else stretch_of(first)), first
+    looked_at = problem if start.rung is first else replace(problem, runs=start.rung.problem.runs)
     queue, idle = [start], {id(start): 0}
     likeliest, told, partly = start, None, None
     for turn in range(EXPANDED):
