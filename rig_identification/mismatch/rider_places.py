@@ -128,7 +128,7 @@ def other_ways(problem: Problem, beyond: Beyond, known: str, amount: float, at: 
     weights = amount * monomials(u)
     out = {}
     for axis in AXES:
-        if axis == known:
+        if axis in known:
             continue
         responses = _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,))
         found, gains = beyond.of(responses), np.zeros(len(FREQUENCIES))

@@ -305,19 +305,23 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
 def _all_ways(
     swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
 ) -> list[tuple[Candidate, dict[str, float]]]:
-    """A part that was fitted along one axis, moving along others too. mass: kg, of the body."""
+    """A part that was fitted along one axis or two, moving along others too. mass: kg, of the body."""
     opened = _opened(problem, evaluation, [])
     if opened is None:
         return []
     effect, known = swing.effect, swing.directions
     values = problem.bench.parameters.named(evaluation.point.theta)
     amount, at = values[f"{effect}.mass"], np.array([values[f"{effect}.position.{a}"] for a in AXES])
-    ways = other_ways(problem, opened[1], known, amount, at) | {known: values[f"{effect}.frequency"]}
-    if len(ways) == 1:
+    have = {a: values[f"{effect}.frequency.{a}" if swing.along else f"{effect}.frequency"] for a in known}
+    ways = other_ways(problem, opened[1], known, amount, at) | have
+    if len(ways) == len(known):
         return []
     axes = "".join(a for a in AXES if a in ways)
     along = tuple(ways[a] for a in axes)
-    candidate, start = rider_candidate(problem, Swing(axes, min(along), along), mass, amount, at)
+    moving = Swing(axes, min(along), along)
+    candidate, start = rider_candidate(problem, moving, mass, amount, at)
+    if len(axes) < len(AXES):
+        candidate = replace(candidate, between=partial(_all_ways, moving, mass))
     start |= {f"{effect}.frequency.{a}": f for a, f in ways.items()}
     return [(candidate, start | {f"{effect}.damping_ratio": values[f"{effect}.damping_ratio"]})]
 

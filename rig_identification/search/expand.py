@@ -370,7 +370,10 @@ def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> I
             begun = fitted_at(wide, point, rung.level, STAYING)
             down = None if begun is None else walked_down(wide, begun.evaluation.point, rung.level)
             if down is not None:
-                yield Standing(down, (*others, closer))
+                nearer = Standing(down, (*others, closer))
+                yield nearer
+                if nearer.evidence > standing.evidence + MEANT:
+                    yield from _closer(problem, nearer, budget, say)
 
 
 def _without(problem: Problem, standing: Standing, left_out: int) -> Point:

@@ -19,7 +19,7 @@ from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.expand import MEANT, Standing, children
-from rig_identification.search.ladder import Rung, begun, climbed
+from rig_identification.search.ladder import REACHED, Rung, begun, climbed
 from rig_identification.search.levels import ALONE
 from rig_identification.search.stretch import over_all, stretch_of
 from rig_identification.search.whole import MOST_EFFECTS, in_whole_runs
@@ -122,6 +122,9 @@ def search(
             if likeliest is best:
                 partly = found
         for child in every:
+            if child.evidence - standing.evidence < REACHED * (best.evidence - standing.evidence):
+                # What stands in for two effects leads by less over either of them
+                break
             stays = child.rung.level <= standing.rung.level and not child.rung.alone
             idle[id(child)] = idle[id(standing)] + 1 if stays else 0
             if len(child.found) < MOST_EFFECTS and idle[id(child)] < IDLE:
