@@ -37,8 +37,8 @@ from rig_identification.model.effects import place
 Array = NDArray[np.float64]
 
 #: Factors on the frequency, coarse and then fine, and damping ratios that are tried.
-COARSE = tuple(float(f) for f in np.geomspace(0.9, 1.11, 9))
-FINE = tuple(float(f) for f in np.geomspace(0.985, 1.015, 5))
+COARSE = (0.975, 1.0, 1.025)
+FINE = tuple(float(f) for f in np.geomspace(0.9875, 1.0125, 5))
 DAMPINGS = (0.006, 0.03, 0.12)
 #: Frequencies that are tried at once, and those of a part that moves along all axes.
 AT_ONCE, SPARSE = 12, FREQUENCIES[::2]

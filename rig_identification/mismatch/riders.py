@@ -53,7 +53,10 @@ class Swing:
         return "liquid_slosh" if self.directions == "xy" else "sprung_mass"
 
 
-SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES)
+#: Swings that are tried; neighbours tell much the same, and count once.
+SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES[::2])
+#: Numbers of a rider: mass, place, frequency, damping.
+NUMBERS = 6
 
 
 def middle_of(rig: Rig) -> Array:

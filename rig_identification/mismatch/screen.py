@@ -15,11 +15,13 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.stretching import STIFFNESS
+from rig_identification.estimate.verdict import FALSE_ALARM
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.boxed import Boxed, probed_of
 from rig_identification.mismatch.candidate import Candidate
@@ -34,6 +36,8 @@ from rig_identification.mismatch.rider_places import (
     spread_of,
 )
 from rig_identification.mismatch.riders import (
+    NUMBERS,
+    SWINGS,
     Swing,
     middle_of,
     rider_candidate,
@@ -51,6 +55,9 @@ from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
+#: Share of a promise that is seen at the nearest of the scanned frequencies and at their damping: measured,
+#: half.
+COARSE = 0.5
 #: Share of the best promise down to which a scanned swing keeps its columns, which fill the memory: of
 #: another one they are computed again where it is asked for.
 KEPT = 0.5
@@ -126,7 +133,7 @@ def screen(
     ]
     instead = {p.candidate.label for p in placed}
     out = [*(p for p in out if p.candidate.label not in instead), *placed]
-    out += _riders(problem, beyond, mass)
+    out += _riders(problem, beyond, mass, len(candidates))
     return sorted(out, key=lambda promise: -promise.gain)
 
 
@@ -211,8 +218,12 @@ def _supports(problem: Problem, mass: float, probe: Promise) -> list[Promise]:
     return out
 
 
-def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
-    """The best swing of each direction, of effects that are not in the model already."""
+def _riders(problem: Problem, beyond: Beyond, mass: float, count: int) -> list[Promise]:
+    """The best swing of each direction, of effects that are not in the model already.
+
+    count: of other hypotheses. A swing is looked at more finely where that may make it stand out of chance.
+    """
+    least = 0.5 * float(chi2.isf(FALSE_ALARM / (count + len(SWINGS)), NUMBERS))
     taken = {p.name for p in problem.bench.parameters.free}
     found: dict[tuple[str, str], list[Ridden]] = {}
     for ridden in scanned(problem, beyond, mass):
@@ -228,8 +239,13 @@ def _riders(problem: Problem, beyond: Beyond, mass: float) -> list[Promise]:
     best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
     all_ways = [] if every is None else [_ridden_promise(problem, beyond, every, mass)]
+    # Only what may come to be the best of them, and beyond chance
+    least = COARSE * max([least, *(peaks[0].gain for peaks in best)])
     return [
-        *(_with_elsewhere([_best_near(problem, beyond, peak, mass) for peak in peaks]) for peaks in best),
+        *(
+            _with_elsewhere([_best_near(problem, beyond, p, mass) if p.gain > least else p for p in peaks])
+            for peaks in best
+        ),
         *all_ways,
     ]
 

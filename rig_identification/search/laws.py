@@ -32,6 +32,8 @@ def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
         return found
     others = tuple(t.candidate for t in found if t is not law)
     less = _made_sparse(extended(problem, others), law, budget)
+    if less is law:
+        return found
     return [replace(less if t is law else t, problem=less.problem, evaluation=less.evaluation) for t in found]
 
 

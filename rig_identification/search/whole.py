@@ -53,7 +53,7 @@ def in_whole_runs(
     problem: without any effect. others: with another last effect, likeliest first: of those that hardly
     trail it the one that the held-out runs say most for is told.
     """
-    found = sparse(problem, [standing.trial(c) for c in standing.found], budget)
+    found = [standing.trial(c) for c in standing.found]
     alike = [o.trial(o.found[-1]) for o in others if _comparable(o, standing)]
     ranked = [found[-1], *alike]
     earlier = tuple(found[:-1])
@@ -61,6 +61,8 @@ def in_whole_runs(
     try:
         named = _beside_rivals(Named(problem, (*earlier, ranked[0]), budget, heard=heard), ranked[1:])
         best = whole_runs(ideal, named)
+        named, best = _made_sparse(ideal, named, best)
+        ranked[0] = named.found[-1]
         if not best.wholly:
             named, best, ranked = _next_likely(ideal, named, best, ranked, say)
         if best.wholly:
@@ -70,6 +72,18 @@ def in_whole_runs(
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
     return in_words(best, list(named.found))
+
+
+def _made_sparse(ideal: Ideal, named: Named, best: Explained) -> tuple[Named, Explained]:
+    """Whole runs without those parts of a law that they do not show, where that explains as much."""
+    fitted = [as_fitted(best.fitted, t) for t in named.found]
+    less = sparse(named.problem, fitted, named.budget)
+    if less is fitted:
+        return named, best
+    found = [replace(now, evidence=t.evidence) for now, t in zip(less, named.found, strict=True)]
+    its = replace(named, found=tuple(found))
+    again = whole_runs(ideal, its)
+    return (its, again) if again.told or not best.told else (named, best)
 
 
 def _comparable(other: Standing, standing: Standing) -> bool:
@@ -131,8 +145,8 @@ def _likeliest(
     # A run that one of them cannot follow tells nothing of the others
     followed = set.intersection(*(set(densities) for densities in held))
     said = [
-        t.evidence + sum(densities[key] for key in followed)
-        for (t, _, _), densities in zip(heard, held, strict=True)
+        _over_all(t, found) + sum(densities[key] for key in followed)
+        for (t, _, found), densities in zip(heard, held, strict=True)
     ]
     chosen = max((k for k, h in enumerate(heard) if h[2].wholly), key=lambda k: said[k])
     last, its, found = heard[chosen]
@@ -147,6 +161,11 @@ def _likeliest(
     its = _beside_rivals(replace(its, found=(*earlier, replace(last, evidence=said[chosen]))), trailing)
     told = replace(found.mismatch, alternatives=its.rivals)
     return its, replace(found, mismatch=told, bodies=its.bodies)
+
+
+def _over_all(trial: Trial, found: Explained) -> float:
+    """Log evidence of a trial that was fitted to the first part of runs, over all of them."""
+    return trial.evidence - log_evidence(trial.evaluation) + log_evidence(found.fitted.evaluation)
 
 
 def _simplified(
