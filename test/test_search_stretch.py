@@ -21,7 +21,11 @@ from rig_identification.simulate import simulate_session
 @pytest.fixture(scope="module")
 def whole() -> Rung:
     """A model that lacks a hose, over 30 s."""
-    effects = {"tether": (2000.0, 0.0, 0.0), "tether_pull": (150.0, 0.0, 0.0), "tether_point": (0.2, 0.9, 0.0)}
+    effects = {
+        "tether": (2000.0, 0.0, 0.0),
+        "tether_pull": (150.0, 0.0, 0.0),
+        "tether_point": (0.2, 0.9, 0.0),
+    }
     spec = replace(shaken(14, 30.0), effects=effects, doubts=False)
     problem, theta, held = pose_problem(simulate_session(spec, np.random.default_rng(5))[0])
     start = _begun(problem, theta, held, _silent)

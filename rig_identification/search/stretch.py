@@ -35,10 +35,10 @@ def stretch_of(rung: Rung) -> Rung:
     for run, linearised in zip(rung.problem.runs, rung.evaluation.runs, strict=True):
         seen = np.cumsum(np.sum((linearised.latent / size) ** 2, axis=1))
         last = max(SECONDS / run.grid.step, np.searchsorted(seen, seen[-1] * SECONDS / run.grid.duration))
-        part = _with_wide_nodes(run.between(0, int(last), margin=MARGIN))
-        runs.append(part)
-        stride = round(part.grid.step / run.grid.step)
-        latents.append(linearised.latent[: int(last) + 1 : stride][: part.grid.nodes])
+        first = _with_wide_nodes(run.between(0, int(last), margin=MARGIN))
+        runs.append(first)
+        stride = round(first.grid.step / run.grid.step)
+        latents.append(linearised.latent[: int(last) + 1 : stride][: first.grid.nodes])
     if sum(run.grid.nodes for run in runs) == _length(rung):
         return rung
     part = replace(rung.model, runs=tuple(runs))
