@@ -32,6 +32,7 @@ from rig_identification.estimate.growing import (
 )
 from rig_identification.estimate.hung_by_eye import hung_by_eye
 from rig_identification.estimate.hung_by_eye import note_of as note_of_center
+from rig_identification.estimate.joint_information import joint_information
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, unsettled
@@ -585,7 +586,16 @@ def compose(
         training_error=found.training,
         converged=fitted.converged,
         notes=notes,
+        # Of a model that leaves something, nobody knows which errors another session shares
+        joint=joint_information(session, *basis)
+        if careful is None and told_by_model(fitted, mismatch)
+        else None,
     )
+
+
+def told_by_model(fitted: Fitted, mismatch: Mismatch) -> bool:
+    """Whether a fit came to its end and its model explains the session."""
+    return fitted.converged and mismatch.verdict != "unexplained"
 
 
 def identify(session: Session, progress: Progress | None = None) -> Identification:
