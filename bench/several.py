@@ -39,7 +39,7 @@ from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.several.compare import LEVEL, compare
 from rig_identification.several.fuse import fuse
 from rig_identification.several.session_result import SessionResult
-from rig_identification.several.ties import STAYING
+from rig_identification.several.ties import STAYING, Sharing
 from rig_identification.simulate import SampleRates, SessionSpec, Truth, simulate_session
 from rig_identification.simulate.start import rest_state
 from rig_identification.simulate.true_rig import CUT, channels_of
@@ -156,6 +156,7 @@ def score(entries: list[dict[str, Any]]) -> dict[str, Any]:
     done = [e for e in entries if all(s["converged"] for s in e["sessions"].values())]
     truth = np.array(poses()[FIRST].elements)
     errors, singles, alarms, found, single_p, gains, apart = [], [], [], [], [], [], []
+    nothing_shared = Sharing(rigs=("one", "other"))
     for entry in done:
         pair = {name: result_of(name, told) for name, told in entry["sessions"].items()}
         fused = fuse([pair[FIRST], pair[SECOND]])
@@ -167,7 +168,8 @@ def score(entries: list[dict[str, Any]]) -> dict[str, Any]:
         alike, unlike = fused.comparison, compare([pair[FIRST], pair[OTHER]])
         alarms.append((alike.p, alike.together.p, alike.together.chi_square))
         single_p.append([alike.numbers[name].p for name in ELEMENTS])
-        found.append((unlike.p, unlike.disagreeing[:1]))
+        blind = compare([pair[FIRST], pair[OTHER]], nothing_shared)
+        found.append((unlike.p, unlike.disagreeing[:1], blind.p))
         apart.append(independent_chi_square(pair[FIRST], pair[SECOND]))
     z, one = np.array(errors), np.array(singles)
     p, power = np.array([a[0] for a in alarms]), np.array([f[0] for f in found])
@@ -197,6 +199,7 @@ def score(entries: list[dict[str, Any]]) -> dict[str, Any]:
         },
         "differ": {
             "found": share(power < LEVEL),
+            "found_as_if_nothing_were_shared": share(np.array([f[2] for f in found]) < LEVEL),
             "named_first": {n: sum(f[1] == (n,) for f in found) for n in ELEMENTS},
         },
     }
@@ -245,6 +248,7 @@ def as_markdown(scores: dict[str, Any]) -> str:
         f"| chi-square over its degrees of freedom | {agree['mean_chi_square_over_freedom']:.2f} | 1 |",
         f"| ... as if the sessions shared nothing | {agree['as_if_nothing_were_shared']:.2f} | |",
         f"| pairs that differ by {ADDED:g} kg, said to disagree | {percent(differ['found'])} | |",
+        f"| ... as if the sessions shared nothing | {percent(differ['found_as_if_nothing_were_shared'])} | |",
         "",
         f"Most surely disagreeing number where {ADDED:g} kg were put on: {named}.",
         "",

@@ -111,7 +111,7 @@ def reduced(result: SessionResult, found: Ties, i: int) -> Reduced:
     share = found.shared[i]
     tied = np.flatnonzero(share > 0.0)
     # Unknowns: body, shared numbers, new parts of all doubts, errors beyond the fit's own
-    beyond = _root(result.excess)
+    beyond = result.excess_root
     count, doubts = len(tied), len(share)
     size = 10 + count + doubts + beyond.shape[1]
     map_ = np.zeros((10 + doubts, size))
@@ -232,14 +232,6 @@ def _gain(results: Sequence[SessionResult], total: InertialEstimate) -> dict[str
         if np.isfinite(best) and name not in total.unobservable:
             out[name] = best / float(np.sqrt(total.covariance[k, k]))
     return out
-
-
-def _root(covariance: Array) -> Array:
-    """(10, k) L of which L L' is a covariance of rank k."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = values > 1e-12 * max(float(np.max(values)), np.finfo(float).tiny)
-    return np.asarray(scale[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
 
 
 def _root_of_inverse(information: Array) -> Array:

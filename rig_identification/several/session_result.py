@@ -44,16 +44,23 @@ class SessionResult:
         return np.asarray(inverse @ inverse.T)
 
     @cached_property
-    def excess(self) -> Array:
-        """(10, 10) what the answer's covariance holds beyond the fit's own: rivals, traces, other headings.
+    def excess_root(self) -> Array:
+        """(10, k) L: L L' is what the answer's covariance holds beyond the fit's own.
 
-        Without joint information it is all of it. Elements that are not determined have none.
+        Rivals, traces, other headings; without joint information all of it. Elements that are not determined
+        have none.
         """
-        seen = np.ix_(self.observed, self.observed)
+        seen = np.flatnonzero(self.observed)
         own = np.zeros((10, 10)) if self.joint is None else self.posterior[:10, :10]
-        out = np.zeros((10, 10))
-        out[seen] = _beyond(self.estimate.covariance[seen], own[seen])
+        root = _beyond(self.estimate.covariance[np.ix_(seen, seen)], own[np.ix_(seen, seen)])
+        out = np.zeros((10, root.shape[1]))
+        out[seen] = root
         return out
+
+    @property
+    def excess(self) -> Array:
+        """(10, 10) what the answer's covariance holds beyond the fit's own."""
+        return np.asarray(self.excess_root @ self.excess_root.T)
 
     @cached_property
     def values(self) -> Array:
@@ -63,10 +70,10 @@ class SessionResult:
 
 
 def _beyond(whole: Array, own: Array) -> Array:
-    """What a covariance holds beyond another one, in the directions in which that is more than rounding."""
+    """(n, k) root of what a covariance holds beyond another one, where that is more than rounding."""
     if not whole.size:
         return whole
     scale = np.sqrt(np.diag(whole))
     values, vectors = np.linalg.eigh((whole - own) / np.outer(scale, scale))
-    root = scale[:, None] * vectors * np.sqrt(np.where(values > ROUNDING, values, 0.0))
-    return np.asarray(root @ root.T)
+    kept = values > ROUNDING
+    return np.asarray(scale[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
