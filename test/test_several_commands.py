@@ -185,3 +185,35 @@ def test_the_sessions_of_these_tests_determine_every_number() -> None:
     """To a few of its units: nothing above could be tested with numbers that are not known."""
     std = np.sqrt(np.diag(sessions()[0].estimate.covariance)) / UNIT
     assert np.all((std > 0.1) & (std < 10.0))
+
+
+def test_memory_tells_what_was_learned_and_recalls_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    *before, new = [str(write(r, tmp_path / r.name)) for r in sessions(4)]
+    out = tmp_path / "out"
+    assert main(["memory", *before, "--for", new, "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("3 sessions, 4 doubts about the rig")
+    assert "day_3 with the memory of its rig" in said
+    told = json.loads((out / "memory.json").read_text(encoding="utf-8"))
+    assert told["sessions"] == ["day_2", "day_1", "day_0"]
+    assert all(doubt["std"] < doubt["tolerance"] for doubt in told["doubts"])
+    alone = json.loads((Path(new) / "result.json").read_text(encoding="utf-8"))
+    recalled = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert recalled["mass"]["std"] <= alone["mass"]["std"]
+    assert recalled["inertia"]["std"][2][2] < alone["inertia"]["std"][2][2]
+
+
+def test_a_memory_of_another_rig_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its numbers stay those of the session alone."""
+    told = sessions(3)
+    joint = told[-1].joint
+    assert joint is not None
+    elsewhere = {cable: point + 5.0 for cable, point in joint.ceiling.items()}
+    told[-1] = replace(told[-1], joint=replace(joint, ceiling=elsewhere))
+    *before, new = [str(write(r, tmp_path / r.name)) for r in told]
+    assert main(["memory", *before, "--for", new, "--out", str(tmp_path / "out")]) == 0
+    recalled = read_result(tmp_path / "out" / "result.json", "recalled")
+    std = np.sqrt(np.diag(told[-1].estimate.covariance))
+    np.testing.assert_allclose(np.sqrt(np.diag(recalled.estimate.covariance)), std, rtol=1e-5)

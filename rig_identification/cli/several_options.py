@@ -81,11 +81,16 @@ def sessions_given(arguments: argparse.Namespace, out: Path | None) -> tuple[lis
 
 
 def _results(arguments: argparse.Namespace, out: Path | None) -> list[SessionResult]:
-    from rig_identification.report.result_file import read_result
-
     paths: Sequence[Path] = arguments.results
     if len(paths) < 2:
         raise InputError(f"{paths[0]}: is one alone; name at least two results")
+    return read_all(paths, out)
+
+
+def read_all(paths: Sequence[Path], out: Path | None) -> list[SessionResult]:
+    """The result behind each path, in their order; errors as of :func:`sessions_given`."""
+    from rig_identification.report.result_file import read_result
+
     names = names_of(paths)
     files = [_result_of(path, name, out) for path, name in zip(paths, names, strict=True)]
     return [read_result(file, name) for file, name in zip(files, names, strict=True)]

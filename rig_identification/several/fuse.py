@@ -91,11 +91,11 @@ def fuse(results: Sequence[SessionResult], sharing: Sharing | None = None) -> Fu
     if first is not None:
         information[:10, :10] += first.weak
         pull[:10] += first.weak @ first.elements - first.weak_gradient
-    root = _root_of_inverse(information)
+    root = root_of_inverse(information)
     covariance = root.T @ root
     values = (covariance @ pull)[:10]
     spread = covariance[:10, :10] + _together(parts, keys, covariance, found)
-    total = InertialEstimate(values, spread, _unobservable(results, data))
+    total = InertialEstimate(values, spread, unobservable(results, data))
     return Fused(total, vehicle_alone(total, frame), compare(results, sharing), _gain(results, total))
 
 
@@ -122,7 +122,7 @@ def reduced(result: SessionResult, found: Ties, i: int) -> Reduced:
     whole = map_.T @ data @ map_
     own = np.arange(10 + count, size)
     whole[own, own] += 1.0
-    kept, kept_pull = _integrated(whole, map_.T @ pull, 10 + count)
+    kept, kept_pull = integrated(whole, map_.T @ pull, 10 + count)
     return Reduced(tuple(found.keys[i][t] for t in tied), kept, kept_pull, result.excess)
 
 
@@ -142,7 +142,7 @@ def _recordings_alone(result: SessionResult, joint: JointInformation) -> tuple[A
     return data, data @ np.concatenate([result.values, at]) + gradient
 
 
-def _integrated(information: Array, pull: Array, kept: int) -> tuple[Array, Array]:
+def integrated(information: Array, pull: Array, kept: int) -> tuple[Array, Array]:
     """Information and pull on the first ``kept`` unknowns, the others integrated out by a Cholesky factor."""
     order = np.roll(np.arange(len(information)), -kept)
     scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))[order]
@@ -188,7 +188,7 @@ def _together(parts: Sequence[Reduced], keys: dict[Hashable, int], covariance: A
     return out
 
 
-def _unobservable(results: Sequence[SessionResult], data: Array) -> tuple[str, ...]:
+def unobservable(results: Sequence[SessionResult], data: Array) -> tuple[str, ...]:
     """Elements that all recordings together do not determine, judged as in observability.py."""
     told = [r.joint for r in results if r.joint is not None]
     if not told:
@@ -234,7 +234,7 @@ def _gain(results: Sequence[SessionResult], total: InertialEstimate) -> dict[str
     return out
 
 
-def _root_of_inverse(information: Array) -> Array:
+def root_of_inverse(information: Array) -> Array:
     """W of which W' W is the inverse of an information matrix."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     factor = np.linalg.cholesky(definite(information * np.outer(scale, scale)))
