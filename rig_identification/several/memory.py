@@ -68,15 +68,25 @@ class Memory:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
-def learned(results: Sequence[SessionResult], sharing: Sharing | None = None, level: float = LEVEL) -> Memory:
+#: What is known of a rig before its first session.
+NOTHING_YET = Memory((), (), np.zeros((0, 0)), ())
+
+
+def learned(
+    results: Sequence[SessionResult],
+    sharing: Sharing | None = None,
+    level: float = LEVEL,
+    before: Memory = NOTHING_YET,
+) -> Memory:
     """Memory of a rig after its sessions, in the order in which they were recorded.
 
     What moves in a session is told, and from there on believed where that session has it: its variance grows
     by the shift squared before the session is taken in. A session without joint information teaches nothing.
+    before: what sessions taught that were recorded earlier.
     """
     said = replace(sharing or Sharing(), new=0.0)
     new = (sharing or Sharing()).new
-    memory = Memory((), (), np.zeros((0, 0)), ())
+    memory = before
     found = ties(results, said)
     for i, result in enumerate(results):
         if result.joint is not None:
