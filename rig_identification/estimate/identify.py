@@ -66,6 +66,7 @@ from rig_identification.estimate.watched_mount import mount_from_track, without_
 from rig_identification.estimate.whichever_way import whichever_way
 from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import vehicle_alone
+from rig_identification.joint import JointInformation
 from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.model.sensors import MocapMount
 from rig_identification.recording import Recording, Session
@@ -586,16 +587,21 @@ def compose(
         training_error=found.training,
         converged=fitted.converged,
         notes=notes,
-        # Of a model that leaves something, nobody knows which errors another session shares
-        joint=joint_information(session, *basis)
-        if careful is None and told_by_model(fitted, mismatch)
-        else None,
+        joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
     )
 
 
-def told_by_model(fitted: Fitted, mismatch: Mismatch) -> bool:
-    """Whether a fit came to its end and its model explains the session."""
-    return fitted.converged and mismatch.verdict != "unexplained"
+def _joint(session: Session, fitted: Fitted) -> JointInformation | None:
+    """Body and rig together; None where the fit did not converge, or its body is too thin to be inverted.
+
+    Nor is there one of a model that leaves something: nobody knows which errors another session shares.
+    """
+    if not fitted.converged:
+        return None
+    try:
+        return joint_information(session, fitted.problem, fitted.evaluation)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def identify(session: Session, progress: Progress | None = None) -> Identification:
