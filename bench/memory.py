@@ -2,8 +2,8 @@
 
 One session teaches, another one of the same rig recalls: once in another pose, once in the same pose with
 another body. A hinge that moved: the memory is given one hinge at the ceiling 2 mm beside where the first
-session has it, to a side that is drawn; that is as if it had moved in between. What ten sessions would teach is
-told to first order: the same recordings ten times, as far as the covariance goes.
+session has it, to a side that is drawn; that is as if it had moved in between. What ten sessions would teach
+is told to first order: the same recordings ten times, as far as the covariance goes.
 
     python -m bench.several --pairs 60
     python -m bench.memory

@@ -192,7 +192,7 @@ def _most_moved(
     off = pull - information @ np.array([d.at for d in memory.doubts])
     innovation, spread = off - taken @ off, information - taken @ information
     parts = _parts(memory)
-    best: tuple[float, str, Array] | None = None
+    best: tuple[float, str, NDArray[np.int64]] | None = None
     for name, entries in parts.items():
         p, _, _ = _score(innovation[entries], spread[np.ix_(entries, entries)])
         if p < level / len(parts) and (best is None or p < best[0]):
