@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.examination import Examination
+from rig_identification.joint import JointInformation
 
 Array = NDArray[np.float64]
 
@@ -111,6 +112,9 @@ class Identification:
     examination: Examination | None = None  # of the set-up, before anything was fitted; None: there was none
     work: Work | None = None  # of the fit and the search; None: not counted
     interrupted: bool = False  # whether the user broke the search off: the best answer until then
+    joint: JointInformation | None = (
+        None  # body and rig together; None: the model leaves something, or no fit
+    )
 
 
 class Interrupted(KeyboardInterrupt):

@@ -72,7 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 for a defect of this package; 2 for input that cannot be used; 130 where the user interrupted.
+        0; 1 for a defect of this package; 2 for input that cannot be used; 3 where some sessions of several
+        have no result; 130 where the user interrupted.
     """
     _accept_any_terminal()
     arguments = build_parser().parse_args(argv)
@@ -81,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             from rig_identification.own import VARIABLE  # it imports numpy, which --help needs not
 
             os.environ[VARIABLE] = arguments.effects
-        arguments.run(arguments)
+        status: int | None = arguments.run(arguments)
     except InputError as error:
         _say(f"error: {error}")
         if isinstance(error, MissingDescription):
@@ -89,6 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return UNUSABLE
     except BrokenPipeError:  # whoever read the output has seen enough
         _print_no_more()
+        return SUCCESS
     except KeyboardInterrupt as stopped:
         _say(str(stopped) or "interrupted")
         return INTERRUPTED
@@ -97,7 +99,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             traceback.print_exc()
         _say(f"defect: {type(error).__name__}: {error}. Please report it, with the output of --debug")
         return DEFECT
-    return SUCCESS
+    return SUCCESS if status is None else status
 
 
 def _say(message: str) -> None:

@@ -17,6 +17,11 @@ def add_session_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", type=Path, metavar="SESSION", help="folder with a session.yaml, or that file"
     )
+    add_topic_options(parser)
+
+
+def add_topic_options(parser: argparse.ArgumentParser) -> None:
+    """Take what the topics of sessions are called."""
     parser.add_argument("--namespace", default="/rig", help="namespace of the topics (default: %(default)s)")
     parser.add_argument(
         "--topic",

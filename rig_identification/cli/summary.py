@@ -12,11 +12,11 @@ from rig_identification.result import Identification, InertialEstimate
 def summary(identification: Identification) -> str:
     """What is wrong with the set-up, the ten numbers with half-widths of 95 % intervals, and the verdict."""
     if identification.without_frame is None:
-        tables = [_table("95 % intervals", identification.total)]
+        tables = [table("95 % intervals", identification.total)]
     else:
         tables = [
-            _table("with the carrying frame, 95 % intervals", identification.total),
-            _table("without the carrying frame, 95 % intervals", identification.without_frame),
+            table("with the carrying frame, 95 % intervals", identification.total),
+            table("without the carrying frame, 95 % intervals", identification.without_frame),
         ]
     mismatch = identification.mismatch
     verdict = f"verdict: {mismatch.verdict}. {mismatch.explanation}"
@@ -25,7 +25,8 @@ def summary(identification: Identification) -> str:
     return "\n\n".join(filter(None, [*set_up, *tables, verdict]))
 
 
-def _table(title: str, estimate: InertialEstimate) -> str:
+def table(title: str, estimate: InertialEstimate) -> str:
+    """The ten numbers with half-widths of 95 % intervals."""
     ten = elements(estimate)
     texts = [(e.symbol + e.index, plain_number(e.value), plain_number(e.half_width), e.unit) for e in ten]
     width = max((len(value) for _, value, _, _ in texts), default=0)

@@ -32,6 +32,7 @@ from rig_identification.estimate.growing import (
 )
 from rig_identification.estimate.hung_by_eye import hung_by_eye
 from rig_identification.estimate.hung_by_eye import note_of as note_of_center
+from rig_identification.estimate.joint_information import joint_information
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, unsettled
@@ -65,6 +66,7 @@ from rig_identification.estimate.watched_mount import mount_from_track, without_
 from rig_identification.estimate.whichever_way import whichever_way
 from rig_identification.estimate.whole import fit_whole, predicted
 from rig_identification.estimate.without_frame import vehicle_alone
+from rig_identification.joint import JointInformation
 from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.model.sensors import MocapMount
 from rig_identification.recording import Recording, Session
@@ -585,7 +587,21 @@ def compose(
         training_error=found.training,
         converged=fitted.converged,
         notes=notes,
+        joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
     )
+
+
+def _joint(session: Session, fitted: Fitted) -> JointInformation | None:
+    """Body and rig together; None where the fit did not converge, or its body is too thin to be inverted.
+
+    Nor is there one of a model that leaves something: nobody knows which errors another session shares.
+    """
+    if not fitted.converged:
+        return None
+    try:
+        return joint_information(session, fitted.problem, fitted.evaluation)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def identify(session: Session, progress: Progress | None = None) -> Identification:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.joint import Doubt, JointInformation
 from rig_identification.recording import Recording, Session
 from rig_identification.result import Finding, Identification, InertialEstimate, ParameterEstimate
 from rig_identification.rig import Mount, Rig
@@ -101,6 +102,7 @@ def told(found: Identification, origins: Origins) -> Identification:
         mismatch=replace(mismatch, findings=tuple(_finding(f, origins) for f in mismatch.findings)),
         parameters=tuple(_parameter(p, origins) for p in found.parameters),
         figures=figures,
+        joint=None if found.joint is None else _joint(found.joint, origins),
     )
 
 
@@ -112,12 +114,37 @@ def _body(estimate: InertialEstimate, origins: Origins) -> InertialEstimate:
 
 
 def _parameter(parameter: ParameterEstimate, origins: Origins) -> ParameterEstimate:
-    device, *_, kind, axis = ("", "", *parameter.name.split("."))[-3:]
-    origin = origins.body if kind in IN_BODY else origins.world if kind in IN_WORLD else None
-    if origin is None or device in ERRORS_ONLY:
-        return parameter
-    shift = float(origin["xyz".index(axis)])
+    shift = _shift(parameter.name, origins)
     return replace(parameter, nominal=parameter.nominal + shift, value=parameter.value + shift)
+
+
+def _shift(name: str, origins: Origins) -> float:
+    """By how much a parameter's number grows that is told about the given origins, m."""
+    device, *_, kind, axis = ("", "", *name.split("."))[-3:]
+    origin = origins.body if kind in IN_BODY else origins.world if kind in IN_WORLD else None
+    return 0.0 if origin is None or device in ERRORS_ONLY else float(origin["xyz".index(axis)])
+
+
+def _joint(joint: JointInformation, origins: Origins) -> JointInformation:
+    """Places alone move, by a constant: the information stays as it is."""
+
+    def doubt(d: Doubt) -> Doubt:
+        return replace(d, nominal=d.nominal + _shift(d.name, origins))
+
+    frame = joint.frame
+    if frame is not None:
+        frame = replace(frame, center_of_mass=frame.center_of_mass + origins.body)
+    in_body, beside = np.concatenate([origins.body, np.zeros(4)]), {"inclinometer": 0.0}
+    elements = joint.elements.copy()
+    elements[1:4] += origins.body
+    return replace(
+        joint,
+        elements=elements,
+        doubts=tuple(map(doubt, joint.doubts)),
+        frame=frame,
+        ceiling={cable: point + origins.world for cable, point in joint.ceiling.items()},
+        mounts={name: mount + beside.get(name, 1.0) * in_body for name, mount in joint.mounts.items()},
+    )
 
 
 def _finding(finding: Finding, origins: Origins) -> Finding:

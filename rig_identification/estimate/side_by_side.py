@@ -18,6 +18,8 @@ Outcome = TypeVar("Outcome")
 
 #: Tasks at once at most: a handful of pieces share one memory.
 MOST = 8
+#: Environment variable with the cores that this process may use, where several share a machine.
+SHARE = "RIG_IDENTIFICATION_CORES"
 
 _lock = threading.Lock()
 _running = 0
@@ -26,7 +28,8 @@ _running = 0
 def cores() -> int:
     """Cores that this process may use, as far as tasks are put side by side on them."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(MOST, usable)
+    share = os.environ.get(SHARE, "")
+    return min(MOST, usable, max(1, int(share)) if share.isdecimal() else MOST)
 
 
 def spare() -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.report.examination_json import check_part
+from rig_identification.report.joint_json import joint_to_dict
 from rig_identification.report.plain import plain
 from rig_identification.result import ELEMENTS, Finding, Identification, InertialEstimate, Mismatch, Work
 
@@ -28,15 +29,11 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         ``mismatch`` holds one key more, ``ideal_model``: mass, centre of mass, inertia and what is
         unobservable as the ideal model alone has them. Where the session was examined, ``check`` holds
         what was found before anything was fitted. ``work`` says what the answer took, where it was counted,
-        and ``interrupted`` is there, and true, where the user broke the search off.
+        and ``interrupted`` is there, and true, where the user broke the search off. ``joint`` is what
+        sessions are compared and fused by, where the model explains this one.
     """
-    total = identification.total
-    without_frame = identification.without_frame
     return {
-        **_estimate(total),
-        "covariance": _masked(total.covariance, _observable(total)),
-        "without_frame": None if without_frame is None else _estimate(without_frame),
-        "unobservable": list(total.unobservable),
+        **estimate_part(identification.total, identification.without_frame),
         "mismatch": {
             **_mismatch(identification.mismatch),
             **_ideal_model(identification.figures.get("ideal")),
@@ -44,6 +41,17 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         **_work(identification.work),
         **({"interrupted": True} if identification.interrupted else {}),
         **({} if identification.examination is None else {"check": check_part(identification.examination)}),
+        **({} if identification.joint is None else {"joint": joint_to_dict(identification.joint)}),
+    }
+
+
+def estimate_part(total: InertialEstimate, without_frame: InertialEstimate | None) -> dict[str, object]:
+    """The contract's keys that tell of the body."""
+    return {
+        **_estimate(total),
+        "covariance": _masked(total.covariance, _observable(total)),
+        "without_frame": None if without_frame is None else _estimate(without_frame),
+        "unobservable": list(total.unobservable),
     }
 
 

@@ -64,6 +64,8 @@ class SessionSpec:
     ``noise``: every sample has the noise of ``rig.noise``. ``doubts``: the true rig is drawn
     about the description, each quantity by its tolerance (normal, cut at three tolerances:
     what lies beyond would be a finding), and the scale's reading about the true mass.
+    ``given_doubts``: doubts that are not drawn, each so many tolerances off its description: what sessions
+    of one rig share. ``scale_reading``: kg that the scale showed instead of a drawn reading.
     ``rods``: the cables push as well. ``effects``: left-out physics by the switches of
     ``live/plant_switches.py`` (a push's start counts from the run's), and errors of devices by the names of
     their doubts (``imu.gyroscope_bias.x``), on top of what is drawn.
@@ -81,3 +83,5 @@ class SessionSpec:
     effects: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     world_in_tracker: Mount = field(default_factory=lambda: TRACKER)
     start_ns: int = 1_790_000_000_000_000_000  # stamp at which the first recording starts
+    given_doubts: Mapping[str, float] = field(default_factory=dict)
+    scale_reading: float | None = None

@@ -80,9 +80,12 @@ def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
         # A mount that no one described is not a doubt: it stays where the simulation puts it
         unknown = [p.name.startswith("mocap.") and p.prior_std >= UNKNOWN_ROTATION for p in parameters.free]
         theta[INERTIAL:] = np.where(unknown, 0.0, drawn)
+        theta[INERTIAL:] = [
+            spec.given_doubts.get(p.name, at) for p, at in zip(parameters.free, theta[INERTIAL:], strict=True)
+        ]
         if described.mass is not None and described.mass_std is not None:
             reading = float(spec.elements[0]) + described.mass_std * float(rng.standard_normal())
-            described = replace(described, mass=reading)
+            described = replace(described, mass=reading if spec.scale_reading is None else spec.scale_reading)
     values = {p.name: float(v) for p, v in zip(parameters.free, parameters.values(theta), strict=True)}
     true = model.with_physics(parameters.physics(theta))
     out = TrueRig(true, parameters.device(theta), parameters, values, described)

@@ -29,7 +29,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for result and report")
     parser.add_argument(
         "--work",
-        type=_units,
+        type=units,
         default=WORK,
         metavar="UNITS",
         help="after so many units of work the search for what the ideal model leaves out begins nothing new; "
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> None:
     )
 
 
-def _units(text: str) -> float:
+def units(text: str) -> float:
     """A number of units of work above none."""
     try:
         value = float(text)
