@@ -22,7 +22,9 @@ class UncertaintySource:
     name: str  # "cable_1 tension", "tolerance.cable_length", "ground scale"
     kind: str  # "noise", "rest", "tolerance", "scale", "belief", "frame", "model"
     covariance: Array  # (10, 10) in the order of ELEMENTS; of a "model" a variance may be below nothing
-    degrees_of_freedom: float | None = None  # of the std that the source has; None: it is stated, not estimated
+    degrees_of_freedom: float | None = (
+        None  # of the std that the source has; None: it is stated, not estimated
+    )
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,17 @@ def of_first_rows(linearised: Linearised, nodes: int) -> Linearised:
     )
     cut = {
         name: getattr(linearised, name)[kept]
-        for name in ("residual", "jacobian", "nodes", "channel", "axis", "plain", "variance", "row_H", "row_D")
+        for name in (
+            "residual",
+            "jacobian",
+            "nodes",
+            "channel",
+            "axis",
+            "plain",
+            "variance",
+            "row_H",
+            "row_D",
+        )
     }
     return replace(linearised, motion=motion, noise=noise, latent=linearised.latent[:nodes], **cut)
 

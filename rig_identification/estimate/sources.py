@@ -25,7 +25,7 @@ from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.rest_evidence import BLOCKS, RestChannel, RestLinearised
 from rig_identification.estimate.solve import Evaluation, Problem
-from rig_identification.estimate.whitening import whitened_back
+from rig_identification.estimate.whitening_back import whitened_back
 from rig_identification.model.definite import definite
 from rig_identification.result import InertialEstimate, UncertaintySource
 
@@ -74,8 +74,8 @@ def with_sources(
 ) -> InertialEstimate:
     """The estimate with the sources of its covariance, which add up to it.
 
-    problem, evaluation: the fit that it comes from. loose: factor that its covariance was widened by. What the
-    fit's own sources do not account for stands in a row of its own (:data:`RIVALS`).
+    problem, evaluation: the fit that it comes from. loose: factor that its covariance was widened by. What
+    the fit's own sources do not account for stands in a row of its own (:data:`RIVALS`).
     """
     found = tuple(replace(s, covariance=loose * s.covariance) for s in sources(problem, evaluation))
     return closed(replace(total, sources=found))
@@ -223,7 +223,7 @@ def _of_priors(problem: Problem, theta: Array) -> Iterator[_Part]:
 
 
 def prior_name(parameter: Parameter) -> tuple[str, str]:
-    """Name and kind of the source that a parameter's prior is: a tolerance of the description, or a belief."""
+    """Name and kind of the source that a parameter's prior is: a described tolerance, or a belief."""
     parts = parameter.name.split(".")
     stem = parts[:-1] if parts[-1] in ("x", "y", "z") else parts
     key = _TOLERANCE.get(".".join(stem[-2:])) or _TOLERANCE.get(stem[-1])

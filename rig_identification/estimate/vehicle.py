@@ -1,8 +1,8 @@
 """What road-vehicle engineering asks of a body: height of the centre of mass, axle shares, radii of gyration.
 
-Axes are those of ISO 8855: x forward in the ground plane, y to the left, z up from it. The ground plane is the
-one that lies nearest to the four points where the wheels touch it. Terms are those of ISO 10392 (determination
-of the centre of gravity) and of the yaw, pitch and roll inertia of SAE J1574 and ISO 789.
+Axes are those of ISO 8855: x forward in the ground plane, y to the left, z up from it. The ground plane is
+the one that lies nearest to the four points where the wheels touch it. Places of the centre of mass are those
+that ISO 10392 (determination of the centre of gravity) asks for.
 """
 
 from __future__ import annotations
@@ -109,7 +109,9 @@ def _with_std(alone: InertialEstimate, asked: _Asked) -> list[Quantity]:
     for column, i in enumerate(known):
         aside = np.zeros(len(ELEMENTS))
         aside[i] = STEP * std[i]
-        slope[:, column] = (asked.of(alone.values + aside) - asked.of(alone.values - aside)) / (2.0 * aside[i])
+        slope[:, column] = (asked.of(alone.values + aside) - asked.of(alone.values - aside)) / (
+            2.0 * aside[i]
+        )
     variance = np.einsum("qi,ij,qj->q", slope, alone.covariance[np.ix_(known, known)], slope)
     return [
         Quantity(name, float(v), float(np.sqrt(max(s, 0.0))), unit)

@@ -56,7 +56,9 @@ def subtract_frame(total: InertialEstimate, frame: CarryingFrame) -> InertialEst
                 2: ("Jxx", "Jxz", "Jyy", "Jyz"),
             }
             lost |= set(touched[axis])
-    sources = tuple(replace(s, covariance=map_[:, :10] @ s.covariance @ map_[:, :10].T) for s in total.sources)
+    sources = tuple(
+        replace(s, covariance=map_[:, :10] @ s.covariance @ map_[:, :10].T) for s in total.sources
+    )
     if sources:
         own_share = map_[:, 10:] @ covariance[10:, 10:] @ map_[:, 10:].T
         sources = (*sources, UncertaintySource("carrying frame", "frame", own_share))

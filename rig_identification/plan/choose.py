@@ -1,9 +1,8 @@
 """Which runs to make, in which order: greedily, for the inertia that would be known worst.
 
-Information adds up, so that each choice is a sum of matrices and an inverse. The set function is monotone, and
-the greedy choice of sensors or experiments by such a criterion comes near the best one (Shamaiah, Banerjee and
-Vikalo, IEEE CDC 2010, for the determinant); worst elements are compared first, the volume of all six breaks
-ties and plateaus.
+Information adds up, so that each choice is a sum of matrices and an inverse. The greedy choice of experiments
+comes near the best one (Shamaiah, Banerjee and Vikalo, IEEE CDC 2010, show it for the determinant). The worst
+element is compared first; the mean of all breaks ties.
 """
 
 from __future__ import annotations
@@ -116,7 +115,9 @@ def choose(
             c
             for c in choices
             if spent + c.item.seconds <= seconds + 1e-6
-            and (moving + c.item.seconds <= most + 1e-6 if c.item.run is not None else c.item.name not in taken)
+            and (
+                moving + c.item.seconds <= most + 1e-6 if c.item.run is not None else c.item.name not in taken
+            )
         ]
         if not open_:
             break

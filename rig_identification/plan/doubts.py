@@ -8,7 +8,7 @@ prior's std) has across-information G (b, k) and information S of its own, so th
 
 Left out of the model, phi gains phi^T F phi / 2 nats for whoever asks for it (the noncentral half of a
 chi-square), and bends what is estimated by C G phi. What is detected has to gain a threshold (hypotheses.py,
-needed_gain). So at half its detection limit, and within one std of what is plausible, phi lies in the ellipsoid
+needed_gain). So at half its detection limit, and within one std of what is plausible, phi lies in
 
     phi^T A phi <= 1,    A = 4 F / (2 gain) + 1,
 
@@ -27,6 +27,7 @@ from rig_identification.estimate.identify import runs_of
 from rig_identification.estimate.mixture import weights
 from rig_identification.estimate.observability import invert_information, natural_size
 from rig_identification.estimate.parameters import INERTIAL, Parameter
+from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Point
 from rig_identification.estimate.verdict import DOUBTED
 from rig_identification.mismatch.candidate import Candidate
@@ -40,7 +41,6 @@ from rig_identification.plan.information import Laboratory, informations, record
 from rig_identification.plan.menu import Item
 from rig_identification.result import ELEMENTS
 from rig_identification.simulate.start import rest_state
-from rig_identification.estimate.prediction import model_at
 
 Array = NDArray[np.float64]
 

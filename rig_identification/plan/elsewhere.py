@@ -120,7 +120,8 @@ def shortened(rig: Rig) -> tuple[Rig, tuple[str, ...]]:
     axis = int(np.argmax(np.ptp(points[:, :2], axis=0)))
     middle = 0.5 * (np.min(points[:, axis]) + np.max(points[:, axis]))
     shorter = tuple(
-        replace(c, length=(1.0 - SHORTER) * c.length) if c.body_point[axis] > middle else c for c in rig.cables
+        replace(c, length=(1.0 - SHORTER) * c.length) if c.body_point[axis] > middle else c
+        for c in rig.cables
     )
     names = tuple(c.name for c in rig.cables if c.body_point[axis] > middle)
     return replace(rig, cables=shorter), names

@@ -73,9 +73,7 @@ class Laboratory:
     def evaluation(self, information: Array) -> Evaluation:
         """Such an estimate, at its optimum."""
         point, size = Point(self.theta, (), ()), information.shape[0]
-        return Evaluation(
-            point, (), (), 0.0, information, np.diag(self.prior()).copy(), np.zeros(size)
-        )
+        return Evaluation(point, (), (), 0.0, information, np.diag(self.prior()).copy(), np.zeros(size))
 
 
 def laboratory(spec: SessionSpec, first: Item) -> Laboratory:

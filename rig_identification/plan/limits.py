@@ -75,11 +75,17 @@ def _margins(spec: SessionSpec, run: RunSpec, amplitude: float) -> Margins | Non
     true = draw_true_rig(replace(spec, doubts=False), np.random.default_rng(0))
     rest = find_rest(true.model, rest_state(true.model))
     try:
-        motion = fly(true, start_state(true.model, run.start, rest.state), run.force, run.duration, run.name).motion
+        motion = fly(
+            true, start_state(true.model, run.start, rest.state), run.force, run.duration, run.name
+        ).motion
     except InputError:
         return None
     kept = motion.outputs[:, layout.OUT_TENSION :] / rest.tension
-    return Margins(_travel(spec.rig, rest.state.position, rest.state.R_world_body, motion.states, motion.R_world_body), float(np.min(kept)), amplitude)
+    return Margins(
+        _travel(spec.rig, rest.state.position, rest.state.R_world_body, motion.states, motion.R_world_body),
+        float(np.min(kept)),
+        amplitude,
+    )
 
 
 def _travel(rig: Rig, position: Array, R: Array, states: Array, turns: Array) -> float:

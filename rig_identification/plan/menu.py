@@ -1,9 +1,10 @@
-"""What may be recorded: releases, shakes at several frequencies and in several planes, sweeps, known masses."""
+"""What may be recorded: releases, shakes at several frequencies in several planes, sweeps, known masses."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,16 +102,14 @@ def _shakes(rig: Rig, elements: Array, means: Means) -> Iterator[Item]:
 
 
 def frequencies(rig: Rig, elements: Array, means: Means) -> tuple[float, ...]:
-    """Hz: below, between and above the frequencies at which the body swings by itself, and the highest one."""
+    """Hz: below, between and above the frequencies at which the body swings by itself; the highest one."""
     model = rig_model(rig, elements)
     swings = [m.frequency for m in natural_modes(model, rest_state(model)) if m.frequency > 0.05]
     if not swings:
         return (0.5 * means.highest, means.highest)
-    between = [float(np.sqrt(a * b)) for a, b in zip(swings, swings[1:], strict=False)]
+    between = [float(np.sqrt(a * b)) for a, b in pairwise(swings)]
     asked = [swings[0] / 1.6, *between, 1.5 * swings[-1], means.highest]
-    clear = [
-        f for f in asked if f <= means.highest and all(max(f / s, s / f) > BESIDE for s in swings)
-    ]
+    clear = [f for f in asked if f <= means.highest and all(max(f / s, s / f) > BESIDE for s in swings)]
     # Frequencies within a tenth of each other tell the same
     apart: list[float] = []
     for f in sorted(clear or [means.highest]):
@@ -133,7 +132,7 @@ def _known_masses(rig: Rig, elements: Array, means: Means) -> Iterator[Item]:
 
 
 def usual(rig: Rig, elements: Array, means: Means) -> tuple[Item, ...]:
-    """What is recorded without a plan: at rest without and with a known mass, and a release that is shaken."""
+    """What is recorded without a plan: rest without and with a known mass, and a release that is shaken."""
     weight = float(elements[0]) * rig.gravity
     hinges = np.array([cable.body_point for cable in rig.cables])
     pull = means.pull * weight * np.array([np.cos(0.9), np.sin(0.9), 0.0])

@@ -72,19 +72,20 @@ def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) 
     _check(spec, means)
     tell("limits of each run", 0.0)
     allowed, left_out = _allowed(spec, menu(rig, elements, means), means)
-    first = next((item for item in allowed if item.run is not None), None)
+    first = next((item for item, _ in allowed.values() if item.run is not None), None)
     if first is None:
         raise InputError(
-            f"--travel {means.travel:g}: no run keeps every hinge within it and every cable taut; allow more room"
+            f"--travel {means.travel:g}: no run keeps hinges within it and cables taut; allow more room"
         )
     lab = laboratory(spec, first)
     tell("what each run would tell", 0.15)
-    choices = _told(lab, list(allowed))
+    choices = _told(lab, [item for item, _ in allowed.values()])
     fitted = 60.0 * means.minutes - means.block
     still = next((c for c in choices if c.item.name == bare(means).name), None)
     tell("choosing runs", 0.55)
     chosen = choose(lab, choices, fitted, SECONDS, still)
-    recordings = _recordings(lab, chosen, choices, allowed, means)
+    margins = {name: found for name, (_, found) in allowed.items()}
+    recordings = _recordings(lab, chosen, choices, margins)
     expected = lab.expected(chosen.information)
     tell("what the model may lack", 0.6)
     blocks = _counted(chosen)
@@ -107,17 +108,29 @@ def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) 
     )
 
 
+def session_of(found: Plan) -> SessionSpec:
+    """The planned session as one to simulate, with noise and doubts."""
+    items = [planned.item for planned in found.recordings]
+    return replace(
+        found.spec,
+        runs=tuple(item.run for item in items if item.run is not None),
+        statics=tuple(item.static for item in items if item.static is not None),
+        noise=True,
+        doubts=True,
+    )
+
+
 def _check(spec: SessionSpec, means: Means) -> None:
     least = means.rest + 2.0 * means.block
     if 60.0 * means.minutes < least:
         raise InputError(
-            f"--minutes {means.minutes:g}: rest, one run and one held out take {least / 60.0:.2g} minutes at least"
+            f"--minutes {means.minutes:g}: rest, a run and one held out take {least / 60.0:.2g} at least"
         )
     missing = [name for name in _noise_names(spec) if name not in spec.rig.noise]
     if missing:
         raise InputError(
-            f"rig: noise.{missing[0]}: missing; how well a device tells anything follows from its noise: give "
-            f"{', '.join(missing)}"
+            f"rig: noise.{missing[0]}: missing; how well a device tells anything follows from it: "
+            f"give {', '.join(missing)}"
         )
 
 
@@ -136,11 +149,11 @@ def _noise_names(spec: SessionSpec) -> list[str]:
 
 def _allowed(
     spec: SessionSpec, items: Sequence[Item], means: Means
-) -> tuple[dict[Item, Margins], tuple[str, ...]]:
-    """What limits allow, with the margins of each, and the names of the rest."""
-    found = [(item, within_limits(spec, item, means)) for item in items]
-    kept = {limited[0]: limited[1] for _, limited in found if limited is not None}
-    return kept, tuple(item.name for item, limited in found if limited is None)
+) -> tuple[dict[str, tuple[Item, Margins]], tuple[str, ...]]:
+    """What limits allow by name, with the margins of each, and the names of the rest."""
+    found = [(item.name, within_limits(spec, item, means)) for item in items]
+    kept = {name: limited for name, limited in found if limited is not None}
+    return kept, tuple(name for name, limited in found if limited is None)
 
 
 def _told(lab: Laboratory, items: list[Item]) -> list[Choice]:
@@ -155,16 +168,18 @@ def _counted(chosen: Chosen) -> list[tuple[Choice, int]]:
 
 
 def _recordings(
-    lab: Laboratory, chosen: Chosen, choices: list[Choice], margins: dict[Item, Margins], means: Means
+    lab: Laboratory, chosen: Chosen, choices: list[Choice], margins: dict[str, Margins]
 ) -> tuple[Planned, ...]:
     """At rest first, then the runs, one a kind; last a run held out."""
     out = []
     for choice, times in sorted(_counted(chosen), key=lambda pair: pair[0].item.run is not None):
         role = "at rest" if choice.item.run is None else "fitted"
-        out.append(Planned(choice.item.lasting(times), role, margins[choice.item]))
+        out.append(Planned(choice.item.lasting(times), role, margins[choice.item.name]))
     held = _held_out(lab, chosen, choices)
     run = replace(held.run, name=f"{held.name}_{HELD_OUT}", holdout=True) if held.run is not None else None
-    out.append(Planned(replace(held, name=f"{held.name}_{HELD_OUT}", run=run), "held out", margins[held]))
+    out.append(
+        Planned(replace(held, name=f"{held.name}_{HELD_OUT}", run=run), "held out", margins[held.name])
+    )
     return tuple(out)
 
 
@@ -181,7 +196,7 @@ def _held_out(lab: Laboratory, chosen: Chosen, choices: list[Choice]) -> Item:
 
 
 def _usual_worst(lab: Laboratory, chosen: Chosen, means: Means) -> float | None:
-    """Worst relative std of inertia by the usual session of equal length: a release while one speed shakes."""
+    """Worst relative std of inertia by the usual session of equal length (menu.usual)."""
     limited = [
         (item, within_limits(lab.spec, item, means)) for item in usual(lab.spec.rig, lab.spec.elements, means)
     ]

@@ -137,7 +137,9 @@ def certificate_of(document: Mapping[str, Any], where: str) -> Certificate:
             ),
         )
     except (KeyError, TypeError, IndexError, AttributeError) as error:
-        raise InputError(f"{where}: is no whole result.json ({error!r}); identify the session again") from error
+        raise InputError(
+            f"{where}: is no whole result.json ({error!r}); identify the session again"
+        ) from error
 
 
 def _body(heading: str, estimate: Mapping[str, Any], where: str) -> CertifiedBody:

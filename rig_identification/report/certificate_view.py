@@ -19,9 +19,9 @@ HEADS = ("quantity", "value", "U (95 %)", "unit", "u", "k", "degrees of freedom"
 #: What a certificate says of its numbers; each one idea.
 REMARKS = (
     "U = k u is the expanded uncertainty for a coverage probability of 95 %; u is the standard uncertainty.",
-    "Inertia is the tensor about the centre of mass in body axes; off-diagonal elements are those of the tensor.",
-    "The uncertainty holds the noise of every channel, the tolerances of the rig description, and other "
-    "explanations of the recordings that the search found. It holds no effect that acts exactly like inertia.",
+    "Inertia is the tensor about the centre of mass in body axes; Jxy is −∫xy dm, and so on.",
+    "The uncertainty holds the noise of every channel, the tolerances of the rig description, and the other "
+    "explanations of the recordings that the search found. It holds no effect that acts exactly as inertia.",
     "A share is the part of u² that a source accounts for. Shares of a column add up to 100 %.",
 )
 
@@ -91,7 +91,9 @@ def correlation_table(body: CertifiedBody) -> Table:
 def origin_table(certificate: Certificate) -> Table:
     """Which recordings the numbers come from."""
     origin = certificate.provenance
-    told = [(key, str(origin.get(key) or "not recorded")) for key in ("session", "recorded", "digest", "version")]
+    told = [
+        (key, str(origin.get(key) or "not recorded")) for key in ("session", "recorded", "digest", "version")
+    ]
     told += [(f"SHA-256 of {name}", str(digest)) for name, digest in dict(origin.get("files") or {}).items()]
     return Table("Origin", ("what", "which"), tuple(told), words=2)
 

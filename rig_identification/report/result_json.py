@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from rig_identification.report.examination_json import check_part
 from rig_identification.report.plain import plain
-from rig_identification.result import ELEMENTS, Finding, Identification, InertialEstimate, Mismatch, Quantity, Work
+from rig_identification.result import (
+    ELEMENTS,
+    Finding,
+    Identification,
+    InertialEstimate,
+    Mismatch,
+    Quantity,
+    Work,
+)
 
 #: Index into the ten elements of each entry of the inertia tensor.
 INERTIA_INDEX = ((4, 5, 6), (5, 7, 8), (6, 8, 9))

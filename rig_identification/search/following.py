@@ -61,11 +61,7 @@ def with_what_follows(problem: Problem, evaluation: Evaluation) -> InertialEstim
     )
     shift = bends @ np.linalg.solve(left, columns.right)
     loose = coherence(problem, evaluation)
-    covariance = (
-        loose * plain.covariance
-        + bends @ np.linalg.solve(left, bends.T)
-        + np.outer(shift, shift)
-    )
+    covariance = loose * plain.covariance + bends @ np.linalg.solve(left, bends.T) + np.outer(shift, shift)
     std = np.sqrt(np.diag(covariance))
     vague = {name for name, s, b in zip(ELEMENTS, std, believed_std(problem), strict=True) if s > GAIN * b}
     lost = with_products({*plain.unobservable, *vague})

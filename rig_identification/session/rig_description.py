@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from rig_identification.errors import InputError, did_you_mean
-from rig_identification.rig import DEFAULT_TOLERANCE, NOISE_NAMES, Cable, CarryingFrame, Mount, Rig, WheelContacts
+from rig_identification.rig import (
+    DEFAULT_TOLERANCE,
+    NOISE_NAMES,
+    Cable,
+    CarryingFrame,
+    Mount,
+    Rig,
+    WheelContacts,
+)
 from rig_identification.session.fields import Fields, load_fields
 from rig_identification.topics import DEVICES
 
@@ -251,7 +259,9 @@ def _marker_mount(top: Fields) -> Mount | None:
 def _vehicle(top: Fields) -> WheelContacts:
     fields = top.section("vehicle", f"the points where its wheels touch the ground: {', '.join(_WHEELS)}")
     fields.refuse_unknown(_WHEELS)
-    wheels = WheelContacts(*(fields.vector(w, 3, "m", limit=LARGEST_LENGTH, hint=LENGTH_HINT) for w in _WHEELS))
+    wheels = WheelContacts(
+        *(fields.vector(w, 3, "m", limit=LARGEST_LENGTH, hint=LENGTH_HINT) for w in _WHEELS)
+    )
     ahead = wheels.front_left + wheels.front_right - wheels.rear_left - wheels.rear_right
     left = wheels.front_left + wheels.rear_left - wheels.front_right - wheels.rear_right
     for name, between in (("front and rear", ahead), ("left and right", left)):

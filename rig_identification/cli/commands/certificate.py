@@ -3,8 +3,9 @@
 Takes a result.json of identify (or the folder with it), or a session, which is then identified first. Writes
 DIR/certificate.json and DIR/certificate.html, with --pdf DIR/certificate.pdf as well, all or none. The budget
 has a row for each channel, each tolerance of the rig description, and for other explanations of the
-recordings; the rows add up to the variance of each number. A rig description with the points where a vehicle's
-wheels touch the ground (vehicle) adds the height of the centre of mass, axle shares and radii of gyration.
+recordings; the rows add up to the variance of each number. Where the rig description says at which points a
+vehicle's wheels touch the ground (vehicle), the height of the centre of mass, axle shares and radii of
+gyration stand beside it.
 
   rig-identification certificate answer/result.json --out certified --pdf
   rig-identification certificate session --out certified
@@ -31,7 +32,9 @@ RESULT = "result.json"
 def configure(parser: argparse.ArgumentParser) -> None:
     """Take the result or the session, and where to write."""
     add_session_options(parser, metavar="RESULT_OR_SESSION", what="result.json, or a session")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help=f"folder for {DOCUMENT} and {PAGE}")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help=f"folder for {DOCUMENT} and {PAGE}"
+    )
     parser.add_argument("--pdf", action="store_true", help=f"write {PRINT} as well; needs the extra 'pdf'")
 
 
