@@ -66,7 +66,7 @@ def relative_std(lab: Laboratory, information: Array) -> Array:
 
 def determinable(lab: Laboratory, choices: Sequence[Choice]) -> tuple[str, ...]:
     """Elements that all of the menu together would determine."""
-    everything = lab.prior() + np.sum([c.information for c in choices], axis=0)
+    everything = lab.prior + np.sum([c.information for c in choices], axis=0)
     lost = lab.expected(np.asarray(everything)).unobservable
     return tuple(name for name in ELEMENTS if name not in lost)
 
@@ -97,7 +97,7 @@ def choose(
     first: what is recorded anyhow. A recording at rest is made once.
     """
     determined = determinable(lab, choices)
-    information, spent, moving = lab.prior(), 0.0, 0.0
+    information, spent, moving = lab.prior, 0.0, 0.0
     steps: list[Step] = []
 
     def take(choice: Choice) -> None:

@@ -89,7 +89,7 @@ def doubts(lab: Laboratory, chosen: Sequence[tuple[Choice, int]], covariance: Ar
     found = informations(wide, items)
     if any(part is None for part in found):
         return None
-    total = wide.prior() + np.sum(
+    total = wide.prior + np.sum(
         [times * part for (_, times), part in zip(chosen, found, strict=True) if part is not None], axis=0
     )
     asked = _beyond(lab, wide, np.asarray(total), candidates)
@@ -162,6 +162,11 @@ def _columns(
     return across, own, units
 
 
+def _name(candidate: Candidate) -> str:
+    """An effect with its place; what the contract has no word for, by its law."""
+    return candidate.label if candidate.effect != "unknown" else called(candidate.effect, candidate.where)
+
+
 def _bias(beyond: _Beyond, count: int, std: Array) -> Bias:
     """The worst that an effect may do to the tensor at half of its detection limit."""
     k = beyond.F.shape[0]
@@ -173,7 +178,7 @@ def _bias(beyond: _Beyond, count: int, std: Array) -> Bias:
     first = beyond.candidate.parameters[0]
     return Bias(
         beyond.candidate.effect,
-        called(beyond.candidate.effect, beyond.candidate.where),
+        _name(beyond.candidate),
         first.name,
         float(np.sqrt(inside[0, 0]) * beyond.units[0]),
         first.unit,

@@ -82,7 +82,7 @@ def _with_device(
     told = _summed(richer, chosen)
     if told is None:
         return None
-    total = richer.prior() + told
+    total = richer.prior + told
     now = {n for n in ELEMENTS if n not in richer.expected(total).unobservable}
     more = tuple(n for n in ELEMENTS if n in now and n not in steps.determined)
     return Other(text, worst(relative_std(richer, total), steps.determined), more)
@@ -137,6 +137,6 @@ def _shared(lab: Laboratory, first: Array, second: Array) -> Array:
     for k, i in enumerate(own):
         moved[i, i], moved[i, p + k] = 0.0, 1.0
     total = moved.T @ second @ moved
-    total[:p, :p] += first + lab.prior()
+    total[:p, :p] += first + lab.prior
     total[p:, p:] += np.eye(extra)
     return integrated_out(total, p)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,7 @@ class Laboratory:
         """Number of what all recordings share."""
         return self.problem.bench.parameters.size
 
+    @cached_property
     def prior(self) -> Array:
         """(p, p) information of tolerances, ground scale, and what is believed of any body."""
         there = evaluate(self.problem, Point(self.theta, (), ()))
@@ -73,7 +75,7 @@ class Laboratory:
     def evaluation(self, information: Array) -> Evaluation:
         """Such an estimate, at its optimum."""
         point, size = Point(self.theta, (), ()), information.shape[0]
-        return Evaluation(point, (), (), 0.0, information, np.diag(self.prior()).copy(), np.zeros(size))
+        return Evaluation(point, (), (), 0.0, information, np.diag(self.prior).copy(), np.zeros(size))
 
 
 def laboratory(spec: SessionSpec, first: Item) -> Laboratory:

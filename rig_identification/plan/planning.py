@@ -84,8 +84,7 @@ def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) 
     still = next((c for c in choices if c.item.name == bare(means).name), None)
     tell("choosing runs", 0.55)
     chosen = choose(lab, choices, fitted, SECONDS, still)
-    margins = {name: found for name, (_, found) in allowed.items()}
-    recordings = _recordings(lab, chosen, choices, margins)
+    recordings = _recordings(lab, chosen, choices, means)
     expected = lab.expected(chosen.information)
     tell("what the model may lack", 0.6)
     blocks = _counted(chosen)
@@ -167,20 +166,26 @@ def _counted(chosen: Chosen) -> list[tuple[Choice, int]]:
     return [(by_name[name], times) for name, times in chosen.blocks().items()]
 
 
-def _recordings(
-    lab: Laboratory, chosen: Chosen, choices: list[Choice], margins: dict[str, Margins]
-) -> tuple[Planned, ...]:
+def _recordings(lab: Laboratory, chosen: Chosen, choices: list[Choice], means: Means) -> tuple[Planned, ...]:
     """At rest first, then the runs, one a kind; last a run held out."""
     out = []
     for choice, times in sorted(_counted(chosen), key=lambda pair: pair[0].item.run is not None):
         role = "at rest" if choice.item.run is None else "fitted"
-        out.append(Planned(choice.item.lasting(times), role, margins[choice.item.name]))
+        out.append(_planned(lab, choice.item.lasting(times), role, means))
     held = _held_out(lab, chosen, choices)
-    run = replace(held.run, name=f"{held.name}_{HELD_OUT}", holdout=True) if held.run is not None else None
-    out.append(
-        Planned(replace(held, name=f"{held.name}_{HELD_OUT}", run=run), "held out", margins[held.name])
-    )
-    return tuple(out)
+    if held.run is None:
+        raise AssertionError("what is held out moves")
+    name = f"{held.name}_{HELD_OUT}"
+    held = replace(held, name=name, run=replace(held.run, name=name, holdout=True))
+    return (*out, _planned(lab, held, "held out", means))
+
+
+def _planned(lab: Laboratory, item: Item, role: str, means: Means) -> Planned:
+    """An item as long as it is to be, weaker where in that time it would pass a limit that a block keeps."""
+    limited = within_limits(lab.spec, item, means)
+    if limited is None:
+        raise AssertionError(f"{item.name}: a block of it keeps the limits")
+    return Planned(limited[0], role, limited[1])
 
 
 def _held_out(lab: Laboratory, chosen: Chosen, choices: list[Choice]) -> Item:
@@ -207,7 +212,7 @@ def _usual_worst(lab: Laboratory, chosen: Chosen, means: Means) -> float | None:
         return None
     rest = sum(item.seconds for item in items if item.run is None)
     blocks = max(1.0, min(SECONDS, chosen.steps[-1].seconds - rest) / means.block)
-    total = lab.prior()
+    total = lab.prior
     for item, part in zip(items, told, strict=True):
         if part is not None:
             total = total + (1.0 if item.run is None else blocks / len(runs)) * part
