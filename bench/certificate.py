@@ -155,8 +155,8 @@ def as_markdown(rows: dict[str, np.ndarray], errors: dict[str, np.ndarray]) -> s
         "# Budget against Monte Carlo",
         "",
         f"Made by `python -m bench.certificate --draws {draws}`. Root mean square error of the ten numbers",
-        "with one group of sources drawn, over the root of the budget's rows of that group. The last column is",
-        f"the root mean square over all ten. With {draws} draws a ratio of 1 scatters by "
+        "with one group of sources drawn, over the root of the budget's rows of that group. The last column",
+        f"is the root mean square over all ten. With {draws} draws a ratio of 1 scatters by "
         f"{1 / np.sqrt(2 * draws):.2f}.",
         "",
         "| drawn | share of u²(Jzz) | " + " | ".join(ELEMENTS) + " | all |",

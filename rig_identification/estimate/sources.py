@@ -181,7 +181,7 @@ def undone(linearised: Linearised) -> Array:
         columns,
         noise.follow,
     )
-    return columns
+    return np.asarray(columns)
 
 
 def _squared(rows: Array) -> Array:

@@ -90,31 +90,41 @@ def merit(relative: Array, determined: Sequence[str]) -> float:
 
 
 def choose(
-    lab: Laboratory, choices: Sequence[Choice], seconds: float, most: float, first: Choice | None
+    lab: Laboratory,
+    choices: Sequence[Choice],
+    seconds: float,
+    most: float,
+    first: Choice | None,
+    changeover: float = 0.0,
 ) -> Chosen:
     """The best use of ``seconds``. most: s that runs may take, beyond which a fit looks at no more of them.
 
-    first: what is recorded anyhow. A recording at rest is made once.
+    first: what is recorded anyhow. changeover: s before each recording; another block of a run needs none. A
+    recording at rest is made once.
     """
     determined = determinable(lab, choices)
     information, spent, moving = lab.prior, 0.0, 0.0
     steps: list[Step] = []
+    taken: set[str] = set()
+
+    def cost(choice: Choice) -> float:
+        return choice.item.seconds + (0.0 if choice.item.name in taken else changeover)
 
     def take(choice: Choice) -> None:
         nonlocal information, spent, moving
         information = information + choice.information
-        spent += choice.item.seconds
+        spent += cost(choice)
+        taken.add(choice.item.name)
         moving += choice.item.seconds if choice.item.run is not None else 0.0
         steps.append(Step(choice, spent, relative_std(lab, information)))
 
     if first is not None:
         take(first)
     while True:
-        taken = {s.choice.item.name for s in steps}
         open_ = [
             c
             for c in choices
-            if spent + c.item.seconds <= seconds + 1e-6
+            if spent + cost(c) <= seconds + 1e-6
             and (
                 moving + c.item.seconds <= most + 1e-6 if c.item.run is not None else c.item.name not in taken
             )
@@ -123,8 +133,7 @@ def choose(
             break
         now = merit(relative_std(lab, information), determined)
         gains = [
-            (now - merit(relative_std(lab, information + c.information), determined)) / c.item.seconds
-            for c in open_
+            (now - merit(relative_std(lab, information + c.information), determined)) / cost(c) for c in open_
         ]
         take(open_[int(np.argmax(gains))])
     return Chosen(tuple(steps), information, determined)

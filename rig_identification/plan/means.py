@@ -14,7 +14,7 @@ MOTOR, SHAKER = "motor", "shaker"
 class Means:
     """Limits that every planned run keeps."""
 
-    minutes: float = 5.0  # recorded in all, at rest and held out included
+    minutes: float = 5.0  # in all, at rest, held out and changeovers included
     exciter: str = MOTOR
     force: float = 0.05  # largest force of the exciter, share of the weight
     pull: float = 0.06  # largest pull aside before a release, share of the weight
@@ -22,6 +22,7 @@ class Means:
     travel: float = 0.15  # m, that any hinge on the body may move away from rest
     taut: float = 0.1  # share of its tension at rest that each cable keeps
     rest: float = 10.0  # s, of a recording at rest
+    changeover: float = 0.0  # s that each further recording takes before it begins
     rates: SampleRates = field(default_factory=SampleRates)
 
     @property

@@ -80,10 +80,10 @@ def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) 
     lab = laboratory(spec, first)
     tell("what each run would tell", 0.15)
     choices = _told(lab, [item for item, _ in allowed.values()])
-    fitted = 60.0 * means.minutes - means.block
+    fitted = 60.0 * means.minutes - means.block - means.changeover
     still = next((c for c in choices if c.item.name == bare(means).name), None)
     tell("choosing runs", 0.55)
-    chosen = choose(lab, choices, fitted, SECONDS, still)
+    chosen = choose(lab, choices, fitted, SECONDS, still, means.changeover)
     recordings = _recordings(lab, chosen, choices, means)
     expected = lab.expected(chosen.information)
     tell("what the model may lack", 0.6)
@@ -120,7 +120,7 @@ def session_of(found: Plan) -> SessionSpec:
 
 
 def _check(spec: SessionSpec, means: Means) -> None:
-    least = means.rest + 2.0 * means.block
+    least = means.rest + 2.0 * means.block + 3.0 * means.changeover
     if 60.0 * means.minutes < least:
         raise InputError(
             f"--minutes {means.minutes:g}: rest, a run and one held out take {least / 60.0:.2g} at least"
@@ -210,7 +210,7 @@ def _usual_worst(lab: Laboratory, chosen: Chosen, means: Means) -> float | None:
     told = informations(lab, items)
     if not runs or any(part is None for part in told):
         return None
-    rest = sum(item.seconds for item in items if item.run is None)
+    rest = sum(item.seconds for item in items if item.run is None) + len(items) * means.changeover
     blocks = max(1.0, min(SECONDS, chosen.steps[-1].seconds - rest) / means.block)
     total = lab.prior
     for item, part in zip(items, told, strict=True):

@@ -55,9 +55,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="m: the box's middle (default: below the hinges)",
     )
     parser.add_argument("--mass", type=float, metavar="KG", help="of the box (default: the description's)")
-    parser.add_argument(
-        "--minutes", type=float, default=5.0, metavar="MIN", help="recorded in all (default: 5)"
-    )
+    parser.add_argument("--minutes", type=float, default=5.0, metavar="MIN", help="in all (default: 5)")
     parser.add_argument(
         "--exciter",
         choices=("motor", "shaker"),
@@ -71,6 +69,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         ("travel", 0.15, "M", "largest movement of any hinge on the body"),
         ("taut", 0.1, "SHARE", "tension that each cable keeps, share of that at rest"),
         ("rest", 10.0, "S", "length of a recording at rest"),
+        ("changeover", 0.0, "S", "time before each recording, which counts"),
         ("mocap", 0.0, "HZ", "motion capture; 0: none"),
     ):
         parser.add_argument(
@@ -141,10 +140,12 @@ def means_of(arguments: argparse.Namespace) -> Means:
             raise InputError(
                 f"--{name} {getattr(arguments, name):g}: give a number above 0 and up to {most:g}"
             )
+    if not 0.0 <= arguments.changeover <= 3600.0:
+        raise InputError(f"--changeover {arguments.changeover:g}: give 0 to 3600 s")
     if not 0.0 <= arguments.mocap <= 2000.0:
         raise InputError(f"--mocap {arguments.mocap:g}: give a rate up to 2000 Hz, or 0 for none")
     rates = SampleRates(mocap=arguments.mocap, **dict.fromkeys(arguments.without, 0.0))
-    named = {name: getattr(arguments, name) for name in limits}
+    named = {name: getattr(arguments, name) for name in (*limits, "changeover")}
     return Means(exciter=arguments.exciter, rates=rates, **named)
 
 
