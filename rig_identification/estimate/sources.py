@@ -61,11 +61,11 @@ _TOLERANCE = {
 
 @dataclass(frozen=True)
 class _Part:
-    """One source's information: rows (r, n) of which the squares add up, in the problem's unknowns."""
+    """One source's part: what each of its independent errors, of one std, moves the ten numbers by."""
 
     name: str
     kind: str
-    rows: Array
+    moves: Array  # (r, 10)
     freedom: float | None = None
 
 
@@ -105,8 +105,8 @@ def sources(problem: Problem, evaluation: Evaluation) -> tuple[UncertaintySource
     moved = root.T @ (root[:, :INERTIAL] @ map_.T)
     whole = moved.T @ evaluation.information @ moved
     found: dict[tuple[str, str], UncertaintySource] = {}
-    for part in _parts(problem, evaluation):
-        own = part.rows @ moved
+    for part in _parts(problem, evaluation, moved):
+        own = part.moves
         known = found.get((part.name, part.kind))
         before = np.zeros((INERTIAL, INERTIAL)) if known is None else known.covariance
         freedom = _together(None if known is None else known.degrees_of_freedom, part.freedom)
@@ -133,41 +133,33 @@ def _together(one: float | None, other: float | None) -> float | None:
     return None if one is None and other is None else (one or 0.0) + (other or 0.0)
 
 
-def _parts(problem: Problem, evaluation: Evaluation) -> Iterator[_Part]:
-    size, place = evaluation.information.shape[0], problem.bench.parameters.size
+def _parts(problem: Problem, evaluation: Evaluation, moved: Array) -> Iterator[_Part]:
+    """Every source. moved (n, 10): what a unit of gradient of each unknown moves the ten numbers by."""
+    shared = place = problem.bench.parameters.size
     for run, linearised in zip(problem.runs, evaluation.runs, strict=True):
-        starts = linearised.jacobian.shape[1] - problem.bench.parameters.size
-        columns = np.concatenate([np.arange(problem.bench.parameters.size), np.arange(place, place + starts)])
-        for part in _of_run(run, linearised):
-            wide = np.zeros((part.rows.shape[0], size))
-            wide[:, columns] = part.rows
-            yield replace(part, rows=wide)
+        starts = linearised.jacobian.shape[1] - shared
+        own = np.concatenate([moved[:shared], moved[place : place + starts]])
+        yield from _of_run(run, linearised, own)
         place += starts
     for evidence, rest in zip(problem.rests, evaluation.rests, strict=True):
-        for part in _of_rest(problem, evidence.channels, rest):
-            yield replace(part, rows=_widened(part.rows, size))
-    for part in _of_priors(problem, evaluation.point.theta):
-        yield replace(part, rows=_widened(part.rows, size))
+        yield from _of_rest(problem, evidence.channels, rest, moved[:shared])
+    yield from _of_priors(problem, evaluation.point.theta, moved[:shared])
 
 
-def _widened(rows: Array, size: int) -> Array:
-    return np.concatenate([rows, np.zeros((rows.shape[0], size - rows.shape[1]))], axis=1)
-
-
-def _of_run(run: Run, linearised: Linearised) -> Iterator[_Part]:
+def _of_run(run: Run, linearised: Linearised, moved: Array) -> Iterator[_Part]:
     """Each channel's noise in motion."""
-    back = undone(linearised)
+    back = undone(linearised, linearised.jacobian @ moved)
     back *= np.sqrt(linearised.variance)[:, None]
     for index, channel in enumerate(run.channels):
         freedom = float(channel.values.size) if channel.noise_estimated else None
         name = f"{channel.device} {channel.quantity.replace('_', ' ')}"
-        yield _Part(name, "noise", _squared(back[linearised.channel == index]), freedom)
+        yield _Part(name, "noise", back[linearised.channel == index], freedom)
 
 
-def undone(linearised: Linearised) -> Array:
-    """(m, n) inverse covariance of a run's samples times its Jacobian, which comes whitened."""
+def undone(linearised: Linearised, whitened: Array) -> Array:
+    """(m, c) inverse covariance of a run's samples times columns that come ``whitened`` (m, c)."""
     gains, deviations = linearised.filter
-    noise, columns = linearised.noise, linearised.jacobian.copy()
+    noise, columns = linearised.noise, whitened.copy()
     if not np.any(noise.Q):
         return np.asarray(columns / deviations[:, None])
     whitened_back(
@@ -184,12 +176,9 @@ def undone(linearised: Linearised) -> Array:
     return np.asarray(columns)
 
 
-def _squared(rows: Array) -> Array:
-    """(n, n) rows with the squares of any number of ``rows`` (m, n)."""
-    return rows if rows.shape[0] <= rows.shape[1] else np.asarray(np.linalg.qr(rows, mode="r"))
-
-
-def _of_rest(problem: Problem, channels: tuple[RestChannel, ...], rest: RestLinearised) -> Iterator[_Part]:
+def _of_rest(
+    problem: Problem, channels: tuple[RestChannel, ...], rest: RestLinearised, moved: Array
+) -> Iterator[_Part]:
     """Each channel's mean at rest. A wrench that the model lacks is whitened away as in motion."""
     rows = rest.jacobian
     if problem.discrepancy is not None:
@@ -199,27 +188,22 @@ def _of_rest(problem: Problem, channels: tuple[RestChannel, ...], rest: RestLine
         rows = np.linalg.cholesky(definite(inside)).T @ rows
     first = 0
     for channel in channels:
-        here = rows[first : first + channel.mean.size]
+        here = rows[first : first + channel.mean.size] @ moved
         first += channel.mean.size
         name = f"{channel.device} {channel.quantity.replace('_', ' ')} at rest"
         yield _Part(name, "rest", here, BLOCKS - 1.0 if channel.scattered else None)
 
 
-def _of_priors(problem: Problem, theta: Array) -> Iterator[_Part]:
+def _of_priors(problem: Problem, theta: Array, moved: Array) -> Iterator[_Part]:
     """Tolerances, the ground scale, and what is believed of a body before anything is measured."""
     parameters = problem.bench.parameters
-    size = parameters.size
-    vague = np.zeros((INERTIAL, size))
-    vague[:, :INERTIAL] = np.diag(1.0 / problem.weak)
-    yield _Part("belief about the body", "belief", vague)
+    body = moved[:INERTIAL]
+    yield _Part("belief about the body", "belief", body / problem.weak[:, None])
     if problem.mass is not None:
-        row = np.zeros((1, size))
-        row[0, :INERTIAL] = parameters.elements_jacobian(theta)[0] / problem.mass[1]
-        yield _Part("ground scale", "scale", row)
+        row = parameters.elements_jacobian(theta)[:1] / problem.mass[1]
+        yield _Part("ground scale", "scale", row @ body)
     for column, parameter in enumerate(parameters.free, start=INERTIAL):
-        row = np.zeros((1, size))
-        row[0, column] = 1.0
-        yield _Part(*prior_name(parameter), row)
+        yield _Part(*prior_name(parameter), moved[column : column + 1])
 
 
 def prior_name(parameter: Parameter) -> tuple[str, str]:

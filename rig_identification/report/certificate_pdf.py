@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from datetime import datetime, timezone
 from pathlib import Path
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
 #: Points of headings, text and tables.
 TITLE, HEADING, TEXT, CELL = 15, 11, 9, 7
 #: What the fonts that every reader has (Latin-1) lack, and how it is written with them.
-PLAIN = str.maketrans({"−": "-", "\u202f": " ", "–": "-", "σ": "sigma", "⁻": "-", "⁴": "^4", "⁶": "^6"})
+PLAIN = str.maketrans({"−": "-", "\u202f": " ", "–": "-", "σ": "sigma"})
+#: A power of ten, and its exponent's digits in plain type.
+POWER, RAISED = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)"), str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 #: The day of a document without a date. It holds no clock, so that the same result makes the same file.
 NO_DATE = datetime(2000, 1, 1, tzinfo=timezone.utc)
 
@@ -77,6 +80,7 @@ def _date(recorded: str) -> datetime:
 
 
 def _latin(text: str) -> str:
+    text = POWER.sub(lambda power: f"e{power[1].translate(RAISED)}", text)
     return text.translate(PLAIN).encode("latin-1", "replace").decode("latin-1")
 
 

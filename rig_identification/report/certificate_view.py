@@ -19,7 +19,7 @@ HEADS = ("quantity", "value", "U (95 %)", "unit", "u", "k", "degrees of freedom"
 #: What a certificate says of its numbers; each one idea.
 REMARKS = (
     "U = k u is the expanded uncertainty for a coverage probability of 95 %; u is the standard uncertainty.",
-    "Inertia is the tensor about the centre of mass in body axes; Jxy is −∫xy dm, and so on.",
+    "Inertia is the tensor about the centre of mass in body axes; Jxy is minus the integral of x y dm.",
     "The uncertainty holds the noise of every channel, the tolerances of the rig description, and the other "
     "explanations of the recordings that the search found. It holds no effect that acts exactly as inertia.",
     "A share is the part of u² that a source accounts for. Shares of a column add up to 100 %.",
