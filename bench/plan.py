@@ -1,11 +1,11 @@
 """Does a plan keep its word? Expected std against what a fit claims; its choice against the usual session.
 
-*Expected*: a session of a release that is shaken and two recordings at rest is expected as ``plan`` does it,
-simulated (rig doubts, sensor errors and noise drawn) and fitted. Fits go on from the truth, which ends where
-one from no guess does in a fifth of the time. The first sessions are identified in full as well. *Choice*:
-each rig is planned, and the worst std of its inertia set beside that of the usual session of equal length. Rigs:
-case studies 1, 10 and 14 of the thesis and three inclined cables. Both go to a log as they are done; a second
-call goes on where the first stopped.
+*Expected*: a session of a release that is shaken and two recordings at rest is expected as ``plan`` does
+it, simulated (rig doubts, sensor errors and noise drawn) and fitted. Fits go on from the truth, which ends
+where one from no guess does in a fifth of the time. The first sessions are identified in full as well.
+*Choice*: each rig is planned, and the worst std of its inertia set beside that of the usual session of
+equal length. Rigs: case studies 1, 10 and 14 of the thesis and three inclined cables. Both go to a log as
+they are done; a second call goes on where the first stopped.
 
     python -m bench.plan [--sessions 12] [--identified 0] [--plans 4] [--minutes 1.0]
 """
