@@ -72,9 +72,9 @@ def identified(arguments: argparse.Namespace) -> dict[str, Any]:
 
     with StageProgress(sys.stderr) as progress:
         raw = read_recorded(arguments.session, arguments.namespace, dict(arguments.topic), progress)
+        files = file_digests(arguments.session, watched(progress))
         prepared = prepare(raw, watched(progress))
         found = identify_prepared(prepared, progress)
-        files = file_digests(arguments.session, watched(progress))
     return result_to_dict(found, provenance(prepared.session, files))
 
 

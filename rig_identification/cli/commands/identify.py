@@ -82,12 +82,12 @@ def identify_session(
     check_output_folder(out, (RESULT, REPORT))
     with StageProgress(sys.stderr) as progress:
         raw = read_recorded(path, namespace, topics or {}, progress)
+        files = file_digests(path, watched(progress))
         prepared = prepare(raw, watched(progress))
         try:
             identification = identify_prepared(prepared, progress, work)
         except Interrupted as stopped:
             identification = stopped.answer
-        files = file_digests(path, watched(progress))
         progress("writing the report")
         _write(identification, prepared.session, files, out)
     _print(identification, out, remark)
