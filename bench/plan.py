@@ -112,6 +112,8 @@ def as_markdown(sessions: list[dict[str, Any]], plans: list[dict[str, Any]]) -> 
                 cells = " | ".join(f"{found[n]:.2f}" if n in found else "–" for n in ELEMENTS)
                 verdict = e.get("verdict", "") if claim == "identify" else ""
                 lines.append(f"| {e['geometry']} | {e['session']} | {claim} | {verdict} | {cells} |")
+    if not plans:
+        return "\n".join([*lines, ""])
     lines += [
         "",
         "## Choice",

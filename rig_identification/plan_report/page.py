@@ -59,7 +59,7 @@ def _percent(share: float) -> str:
 
 def expected_rows(plan: Plan) -> list[tuple[str, ...]]:
     """Element, guessed value, expected std, the same if nothing is left out, unit, share; as text."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for i, (name, unit) in enumerate(zip(ELEMENTS, UNITS, strict=True)):
         value = significant(plan.expected.values[i], 4)
         if name in plan.expected.unobservable:
@@ -73,7 +73,7 @@ def expected_rows(plan: Plan) -> list[tuple[str, ...]]:
 
 
 def _recordings(plan: Plan) -> list[tuple[str, ...]]:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for planned in plan.recordings:
         item, margins = planned.item, planned.margins
         limits = ("", "") if item.run is None else (
