@@ -73,11 +73,13 @@ setup(
         ],
         "test": [
             f"colcon-common-extensions>=0.3{ROS_WHEELS}",
+            "fpdf2>=2.7.9",
             "hypothesis>=6.90",
             "pytest>=8.0",
             "pytest-xdist>=3.6",
             "ruff>=0.17,<0.18",
         ],
+        "pdf": ["fpdf2>=2.7.9"],
         "docs": ["mkdocs-material>=9.5"],
         "dev": ["exudyn>=1.8", "mujoco>=3.1", "mypy>=1.10"],
     },

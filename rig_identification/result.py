@@ -17,12 +17,25 @@ ELEMENTS = ("m", "cx", "cy", "cz", "Jxx", "Jxy", "Jxz", "Jyy", "Jyz", "Jzz")
 
 
 @dataclass(frozen=True)
+class UncertaintySource:
+    """What one source of doubt adds to the covariance of the ten numbers."""
+
+    name: str  # "cable_1 tension", "tolerance.cable_length", "ground scale"
+    kind: str  # "noise", "rest", "tolerance", "scale", "belief", "frame", "model"
+    covariance: Array  # (10, 10) in the order of ELEMENTS; of a "model" a variance may be below nothing
+    degrees_of_freedom: float | None = (
+        None  # of the std that the source has; None: it is stated, not estimated
+    )
+
+
+@dataclass(frozen=True)
 class InertialEstimate:
     """Mass, centre of mass (body frame) and inertia about it (body axes), with their joint covariance."""
 
     values: Array  # (10,) in the order of ELEMENTS: kg, m, kg m^2
     covariance: Array  # (10, 10)
     unobservable: tuple[str, ...] = ()  # names of ELEMENTS that the recordings cannot determine
+    sources: tuple[UncertaintySource, ...] = ()  # they add up to ``covariance``; none: not told
 
 
 @dataclass(frozen=True)
@@ -96,6 +109,16 @@ class Work:
 
 
 @dataclass(frozen=True)
+class Quantity:
+    """A number that follows from the ten, with its std."""
+
+    name: str  # "center_of_mass_height", "front_axle_share"
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Identification:
     """Everything that ``identify`` found out about a session."""
 
@@ -111,6 +134,7 @@ class Identification:
     figures: dict[str, object] = field(default_factory=dict)  # numbers behind further pictures
     examination: Examination | None = None  # of the set-up, before anything was fitted; None: there was none
     work: Work | None = None  # of the fit and the search; None: not counted
+    vehicle: tuple[Quantity, ...] = ()  # what follows of the body alone for a vehicle (estimate/vehicle.py)
     interrupted: bool = False  # whether the user broke the search off: the best answer until then
     joint: JointInformation | None = (
         None  # body and rig together; None: the model leaves something, or no fit

@@ -75,6 +75,16 @@ class CarryingFrame:
 
 
 @dataclass(frozen=True)
+class WheelContacts:
+    """Where a vehicle's four wheels touch level ground; (3,) m, body."""
+
+    front_left: Vector
+    front_right: Vector
+    rear_left: Vector
+    rear_right: Vector
+
+
+@dataclass(frozen=True)
 class Rig:
     """A rig description (recording contract, section "Rig description")."""
 
@@ -88,6 +98,7 @@ class Rig:
     inclinometer: Mount | None = None  # its position does not matter and is zero
     exciter: Mount | None = None
     mocap: Mount | None = None  # pose of the marker frame in body; None: not known
+    vehicle: WheelContacts | None = None  # None: the body is no vehicle, or nobody said where its wheels are
     noise: dict[str, float] = field(default_factory=dict)  # keys of NOISE_NAMES; missing: estimate it
     tolerance: dict[str, float] = field(default_factory=lambda: dict(DEFAULT_TOLERANCE))  # complete
 

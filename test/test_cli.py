@@ -51,6 +51,8 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
         module.identify = identify  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "rig_identification.search.identify", module)
         monkeypatch.setattr("rig_identification.session.read_raw", read_raw)
+        digests = {"session.yaml": "0" * 64}
+        monkeypatch.setattr("rig_identification.session.provenance.file_digests", lambda *_: digests)
         prepared = Prepared(session, Examination("van", (), (), (), ("imu: nobody knows.",)))
         monkeypatch.setattr("rig_identification.identification.prepare", lambda *_: prepared)
 
@@ -59,13 +61,16 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
 
 
 def test_writes_result_and_report_and_prints_the_numbers(
-    answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    answer: Install, session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     answer(None)
     out = tmp_path / "new" / "out"
     assert main(["identify", "van", "--out", str(out)]) == 0
     assert sorted(p.name for p in out.iterdir()) == ["report.html", "result.json"]
-    assert json.loads((out / "result.json").read_text())["mass"]["value"] == 1240.13
+    result = json.loads((out / "result.json").read_text())
+    assert result["mass"]["value"] == 1240.13
+    assert result["provenance"]["files"] == {"session.yaml": "0" * 64}
+    assert result["provenance"]["session"] == session.name
     printed = capsys.readouterr()
     assert "1240.13 ± 0.78 kg" in " ".join(printed.out.split())
     assert "warning: imu: nobody knows." in printed.out

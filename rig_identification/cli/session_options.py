@@ -12,11 +12,13 @@ if TYPE_CHECKING:
     from rig_identification.raw import RawSession
 
 
-def add_session_options(parser: argparse.ArgumentParser) -> None:
+def add_session_options(
+    parser: argparse.ArgumentParser,
+    metavar: str = "SESSION",
+    what: str = "folder with a session.yaml, or that file",
+) -> None:
     """Take the session and what its topics are called."""
-    parser.add_argument(
-        "session", type=Path, metavar="SESSION", help="folder with a session.yaml, or that file"
-    )
+    parser.add_argument("session", type=Path, metavar=metavar, help=what)
     add_topic_options(parser)
 
 

@@ -59,6 +59,7 @@ from rig_identification.estimate.solve import (
     shortened,
     solve,
 )
+from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.verdict import judge
@@ -101,7 +102,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     elements = elements_that_hang(session)
     model = rig_model(rig, elements)
     model = model if assumed is None else assumed(model)
-    runs, held = _runs_of(rig, session.training), _runs_of(rig, session.holdouts)
+    runs, held = runs_of(rig, session.training), runs_of(rig, session.holdouts)
     rests = tuple(r for r in (prepare_rest(rig, recording) for recording in session.statics) if r.channels)
     if not (runs or rests):
         _refuse(session, held)
@@ -124,7 +125,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     return hung_by_eye(problem), theta, held
 
 
-def _runs_of(rig: Rig, recordings: tuple[Recording, ...]) -> tuple[Run, ...]:
+def runs_of(rig: Rig, recordings: tuple[Recording, ...]) -> tuple[Run, ...]:
     """Runs in which a device that the description mounts was heard, in parts where a force is not known."""
     parts = (away_from_jumps(part) for r in recordings for part in prepare(rig, r).where_driven())
     return enough(tuple(part for part in parts if part.channels))
@@ -576,6 +577,7 @@ def compose(
         notes += (TIED,)
     total, headings = whichever_way(*basis, total)
     notes += (headings,) if headings else ()
+    total = with_sources(total, *basis, loose)
     frame = session.rig.frame
     return Identification(
         total=total,

@@ -35,7 +35,7 @@ SILENT = 1e3
 def elements_covariance(problem: Problem, evaluation: Evaluation) -> Array:
     """(10, 10) Laplace covariance of mass, centre of mass and inertia."""
     map_ = problem.bench.parameters.elements_jacobian(evaluation.point.theta)
-    root = _root_of_inverse(evaluation.information)[:, :INERTIAL] @ map_.T
+    root = root_of_inverse(evaluation.information)[:, :INERTIAL] @ map_.T
     return np.asarray(root.T @ root)
 
 
@@ -48,11 +48,11 @@ def unsettled(problem: Problem, evaluation: Evaluation) -> Array:
 
 def invert_information(information: Array) -> Array:
     """Inverse of an information matrix: a covariance, with no variance below nothing."""
-    root = _root_of_inverse(information)
+    root = root_of_inverse(information)
     return np.asarray(root.T @ root)
 
 
-def _root_of_inverse(information: Array) -> Array:
+def root_of_inverse(information: Array) -> Array:
     """(n, n) W of which W^T W is the inverse of an information matrix, scaled to unit diagonal first."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     factor = np.linalg.cholesky(definite(information * np.outer(scale, scale)))

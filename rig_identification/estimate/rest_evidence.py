@@ -21,6 +21,8 @@ from rig_identification.rig import Rig
 Array = NDArray[np.float64]
 
 
+#: Blocks of a static recording whose means show what is not white in it.
+BLOCKS = 8
 #: Instants that stand for a static recording's time.
 SPREAD = 33
 
@@ -37,6 +39,7 @@ class RestChannel:
     variance: Array  # (w,) of the mean
     noise: Array  # (w,) of one sample
     time: Array  # (m,) s after the recording's start, spread over the samples' span
+    scattered: bool = False  # whether the scatter of block means, beyond the samples' noise, tells a variance
 
     @property
     def columns(self) -> slice | Index:
@@ -60,11 +63,11 @@ def mean_variance(values: Array, noise: Array) -> Array:
     leave in the mean (batch means, Law, "Simulation Modeling and Analysis", section 9.5).
     """
     white = noise**2 / values.shape[0]
-    blocks = np.array_split(values, 8)
+    blocks = np.array_split(values, BLOCKS)
     if min(block.shape[0] for block in blocks) < 4:
         return np.asarray(white)
     means = np.array([np.mean(block, axis=0) for block in blocks])
-    return np.asarray(np.maximum(white, np.var(means, axis=0, ddof=1) / 8.0))
+    return np.asarray(np.maximum(white, np.var(means, axis=0, ddof=1) / BLOCKS))
 
 
 def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
@@ -77,7 +80,10 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
             std, _ = noise_std(rig, quantity, series.time, series.values)
             mean, variance = np.mean(series.values, axis=0), mean_variance(series.values, std)
             time = np.linspace(series.time[0], series.time[-1], SPREAD)
-            channels.append(RestChannel(device, quantity, unit, part.components, mean, variance, std, time))
+            loud = bool(np.any(variance > std**2 / series.values.shape[0]))
+            channels.append(
+                RestChannel(device, quantity, unit, part.components, mean, variance, std, time, loud)
+            )
 
     for cable, series in recording.tension.items():
         add(cable, "tension", "N", series, slice(0, 1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from rig_identification.model.body import (
     linear_from_elements,
     six_elements,
 )
-from rig_identification.result import ELEMENTS, InertialEstimate
+from rig_identification.result import ELEMENTS, InertialEstimate, UncertaintySource
 from rig_identification.rig import CarryingFrame
 
 Array = NDArray[np.float64]
@@ -54,7 +56,14 @@ def subtract_frame(total: InertialEstimate, frame: CarryingFrame) -> InertialEst
                 2: ("Jxx", "Jxz", "Jyy", "Jyz"),
             }
             lost |= set(touched[axis])
-    return InertialEstimate(rest(both), map_ @ covariance @ map_.T, tuple(n for n in ELEMENTS if n in lost))
+    sources = tuple(
+        replace(s, covariance=map_[:, :10] @ s.covariance @ map_[:, :10].T) for s in total.sources
+    )
+    if sources:
+        own_share = map_[:, 10:] @ covariance[10:, 10:] @ map_[:, 10:].T
+        sources = (*sources, UncertaintySource("carrying frame", "frame", own_share))
+    names = tuple(n for n in ELEMENTS if n in lost)
+    return InertialEstimate(rest(both), map_ @ covariance @ map_.T, names, sources)
 
 
 def vehicle_alone(total: InertialEstimate, frame: CarryingFrame | None) -> InertialEstimate | None:

@@ -98,7 +98,7 @@ def carried(problem: Problem, other: Problem, point: Point) -> Point:
     return replace(point, theta=theta)
 
 
-def _adding(problem: Problem, candidates: list[Candidate]) -> Problem:
+def adding(problem: Problem, candidates: list[Candidate]) -> Problem:
     """The problem with what candidates add free, each with its own prior; what they only free stays."""
     have = {p.name for p in problem.bench.parameters.free}
     parameters = problem.bench.parameters
@@ -141,7 +141,7 @@ def _opened(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
 ) -> tuple[Problem, Beyond, Boxed] | None:
     """The problem with what candidates add among its unknowns, and all that is free without it."""
-    wide = _adding(problem, candidates)
+    wide = adding(problem, candidates)
     point = carried(wide, problem, evaluation.point)
     full = evaluate(wide, point)
     if full is None:

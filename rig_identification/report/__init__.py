@@ -7,11 +7,13 @@ from rig_identification.report.examination_json import (
     write_examination,
 )
 from rig_identification.report.html import render_report, write_report
+from rig_identification.report.identity import provenance
 from rig_identification.report.result_json import result_to_dict, write_result
 
 __all__ = [
     "examination_text",
     "examination_to_dict",
+    "provenance",
     "render_check",
     "render_report",
     "result_to_dict",

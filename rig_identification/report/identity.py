@@ -9,12 +9,13 @@ from datetime import datetime, timezone
 
 import numpy as np
 
+from rig_identification import __version__
 from rig_identification.recording import Session
 
 #: ns: stamps before the year 2000 are no date, but seconds after some start.
 _FIRST_DATE = 946_684_800 * 10**9
-#: What says how a bag was read, and a simulation's truth: no part of what was identified.
-_ASIDE = frozenset({"quality", "notes", "ground_truth"})
+#: What says how a bag was read, a simulation's truth, and a vehicle's wheels: no part of what was identified.
+_ASIDE = frozenset({"quality", "notes", "ground_truth", "vehicle"})
 
 
 def recorded_on(session: Session) -> str:
@@ -31,6 +32,17 @@ def digest(session: Session) -> str:
     for part in _parts(session):
         found.update(part)
     return found.hexdigest()[:12]
+
+
+def provenance(session: Session, files: Mapping[str, str]) -> dict[str, object]:
+    """What an answer comes from. files: SHA-256 of each (session/provenance.py)."""
+    return {
+        "version": __version__,
+        "session": session.name,
+        "recorded": recorded_on(session),
+        "digest": digest(session),
+        "files": dict(files),
+    }
 
 
 def _parts(value: object) -> Iterator[bytes]:

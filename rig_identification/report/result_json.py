@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,26 @@ from numpy.typing import NDArray
 from rig_identification.report.examination_json import check_part
 from rig_identification.report.joint_json import joint_to_dict
 from rig_identification.report.plain import plain
-from rig_identification.result import ELEMENTS, Finding, Identification, InertialEstimate, Mismatch, Work
+from rig_identification.result import (
+    ELEMENTS,
+    Finding,
+    Identification,
+    InertialEstimate,
+    Mismatch,
+    Quantity,
+    Work,
+)
 
 #: Index into the ten elements of each entry of the inertia tensor.
 INERTIA_INDEX = ((4, 5, 6), (5, 7, 8), (6, 8, 9))
 
 
-def result_to_dict(identification: Identification) -> dict[str, object]:
+def result_to_dict(
+    identification: Identification, provenance: Mapping[str, object] | None = None
+) -> dict[str, object]:
     """Turn an identification into the contract's result.
+
+    provenance: what it comes from (report/identity.py); it stands under that key.
 
     Returns
     -------
@@ -30,7 +43,8 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
         unobservable as the ideal model alone has them. Where the session was examined, ``check`` holds
         what was found before anything was fitted. ``work`` says what the answer took, where it was counted,
         and ``interrupted`` is there, and true, where the user broke the search off. ``joint`` is what
-        sessions are compared and fused by, where the model explains this one.
+        sessions are compared and fused by, where the model explains this one. ``budget`` holds the
+        variances of the ten numbers by source, where they are told; ``vehicle`` what follows from them.
     """
     return {
         **estimate_part(identification.total, identification.without_frame),
@@ -38,6 +52,8 @@ def result_to_dict(identification: Identification) -> dict[str, object]:
             **_mismatch(identification.mismatch),
             **_ideal_model(identification.figures.get("ideal")),
         },
+        **_vehicle(identification.vehicle),
+        **({} if provenance is None else {"provenance": plain(provenance)}),
         **_work(identification.work),
         **({"interrupted": True} if identification.interrupted else {}),
         **({} if identification.examination is None else {"check": check_part(identification.examination)}),
@@ -50,14 +66,18 @@ def estimate_part(total: InertialEstimate, without_frame: InertialEstimate | Non
     return {
         **_estimate(total),
         "covariance": _masked(total.covariance, _observable(total)),
-        "without_frame": None if without_frame is None else _estimate(without_frame),
+        **_budget(total),
+        "without_frame": None if without_frame is None else _alone(without_frame),
         "unobservable": list(total.unobservable),
     }
 
 
-def write_result(identification: Identification, path: Path) -> None:
+def write_result(
+    identification: Identification, path: Path, provenance: Mapping[str, object] | None = None
+) -> None:
     """Write :func:`result_to_dict` as strict JSON: no NaN, no infinity."""
-    text = json.dumps(result_to_dict(identification), indent=2, allow_nan=False, ensure_ascii=False)
+    document = result_to_dict(identification, provenance)
+    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 
 
@@ -67,6 +87,35 @@ def _observable(estimate: InertialEstimate) -> NDArray[np.bool_]:
 
 def _masked(covariance: NDArray[np.float64], observable: NDArray[np.bool_]) -> object:
     return plain(np.where(np.outer(observable, observable), covariance, np.nan))
+
+
+def _alone(estimate: InertialEstimate) -> dict[str, object]:
+    """The body without its carrying frame, with its covariance where its sources are told."""
+    covariance = {"covariance": _masked(estimate.covariance, _observable(estimate))}
+    return {**_estimate(estimate), **(covariance if estimate.sources else {}), **_budget(estimate)}
+
+
+def _budget(estimate: InertialEstimate) -> dict[str, object]:
+    """Variances of the ten numbers by source; nothing where they are not told."""
+    if not estimate.sources:
+        return {}
+    seen = _observable(estimate)
+    rows = [
+        {
+            "source": source.name,
+            "kind": source.kind,
+            "degrees_of_freedom": source.degrees_of_freedom,
+            "variance": _numbers(np.where(seen, np.diag(source.covariance), np.nan)),
+        }
+        for source in estimate.sources
+    ]
+    return {"budget": rows}
+
+
+def _vehicle(quantities: tuple[Quantity, ...]) -> dict[str, object]:
+    if not quantities:
+        return {}
+    return {"vehicle": {q.name: plain({"value": q.value, "std": q.std, "unit": q.unit}) for q in quantities}}
 
 
 def _estimate(estimate: InertialEstimate) -> dict[str, object]:

@@ -32,6 +32,7 @@ from rig_identification.estimate.observability import (
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.sources import with_sources
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.screen import free_without
@@ -59,15 +60,13 @@ def with_what_follows(problem: Problem, evaluation: Evaluation) -> InertialEstim
         @ (beyond.bent_by(columns)[:INERTIAL])
     )
     shift = bends @ np.linalg.solve(left, columns.right)
-    covariance = (
-        coherence(problem, evaluation) * plain.covariance
-        + bends @ np.linalg.solve(left, bends.T)
-        + np.outer(shift, shift)
-    )
+    loose = coherence(problem, evaluation)
+    covariance = loose * plain.covariance + bends @ np.linalg.solve(left, bends.T) + np.outer(shift, shift)
     std = np.sqrt(np.diag(covariance))
     vague = {name for name, s, b in zip(ELEMENTS, std, believed_std(problem), strict=True) if s > GAIN * b}
     lost = with_products({*plain.unobservable, *vague})
-    return replace(plain, covariance=0.5 * (covariance + covariance.T), unobservable=lost)
+    total = replace(plain, covariance=0.5 * (covariance + covariance.T), unobservable=lost)
+    return with_sources(total, problem, evaluation, loose)
 
 
 def _columns(evaluation: Evaluation) -> tuple[list[Array], list[Array]]:

@@ -24,6 +24,7 @@ from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
+from rig_identification.estimate.vehicle import vehicle_quantities
 from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
@@ -68,7 +69,7 @@ def identify(
         if progress is not None:
             progress(stage, fraction)
 
-    origins = near_origins(session.rig)
+    given, origins = session.rig, near_origins(session.rig)
     session = session if origins.given else moved(session, origins)
     lines = lines_at_rest(session)
     session = without_lines(session, lines)
@@ -77,7 +78,8 @@ def identify(
         found = replace(
             with_work_told(found), mismatch=with_lines(with_overranges(found.mismatch, session), lines)
         )
-        return found if origins.given else told(found, origins)
+        found = found if origins.given else told(found, origins)
+        return replace(found, vehicle=vehicle_quantities(found.without_frame or found.total, given))
 
     with counted():
         try:

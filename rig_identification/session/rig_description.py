@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from rig_identification.errors import InputError, did_you_mean
-from rig_identification.rig import DEFAULT_TOLERANCE, NOISE_NAMES, Cable, CarryingFrame, Mount, Rig
+from rig_identification.rig import (
+    DEFAULT_TOLERANCE,
+    NOISE_NAMES,
+    Cable,
+    CarryingFrame,
+    Mount,
+    Rig,
+    WheelContacts,
+)
 from rig_identification.session.fields import Fields, load_fields
 from rig_identification.topics import DEVICES
 
@@ -19,6 +27,9 @@ FARTHEST_ORIGIN = 10_000.0  # m
 LENGTH_HINT = "is it in mm? lengths are in m"
 _CABLE_KEYS = ("ceiling_point", "body_point", "length", "load_cell")
 _MOUNTS = ("imu", "inclinometer", "exciter", "mocap")
+_WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+#: m: wheels nearer to each other than this span no ground plane.
+LEAST_TRACK = 0.05
 _TOP_KEYS = (
     "gravity",
     "mass",
@@ -27,6 +38,7 @@ _TOP_KEYS = (
     "frame",
     "cables",
     *_MOUNTS,
+    "vehicle",
     "noise",
     "tolerance",
 )
@@ -72,6 +84,7 @@ def rig_from_fields(top: Fields) -> Rig:
         inclinometer=_mount(top, "inclinometer", with_position=False),
         exciter=_mount(top, "exciter"),
         mocap=_marker_mount(top),
+        vehicle=_vehicle(top) if top.has("vehicle") else None,
         noise=_noise(top),
         tolerance=_tolerance(top),
     )
@@ -241,6 +254,22 @@ def _marker_mount(top: Fields) -> Mount | None:
     fields.refuse_misspelt(("position", "orientation"))
     whole = fields.has("position") and fields.has("orientation")
     return _mount(top, "mocap") if whole else None
+
+
+def _vehicle(top: Fields) -> WheelContacts:
+    fields = top.section("vehicle", f"the points where its wheels touch the ground: {', '.join(_WHEELS)}")
+    fields.refuse_unknown(_WHEELS)
+    wheels = WheelContacts(
+        *(fields.vector(w, 3, "m", limit=LARGEST_LENGTH, hint=LENGTH_HINT) for w in _WHEELS)
+    )
+    ahead = wheels.front_left + wheels.front_right - wheels.rear_left - wheels.rear_right
+    left = wheels.front_left + wheels.rear_left - wheels.front_right - wheels.rear_right
+    for name, between in (("front and rear", ahead), ("left and right", left)):
+        if (apart := 0.5 * float(np.linalg.norm(between))) < LEAST_TRACK:
+            raise top.fault("vehicle", f"{name} wheels are {apart:.3g} m apart; check the four points")
+    if float(np.linalg.norm(np.cross(ahead, left))) < 4.0 * LEAST_TRACK**2:
+        raise top.fault("vehicle", "its wheels lie on one line; check the four points")
+    return wheels
 
 
 def _noise(top: Fields) -> dict[str, float]:

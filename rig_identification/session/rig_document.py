@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 from rig_identification.rig import Mount, Rig
 
 _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # xx xy xz yy yz zz
@@ -30,6 +32,8 @@ def rig_document(rig: Rig) -> dict[str, object]:
     for name in ("imu", "inclinometer", "exciter", "mocap"):
         if (mount := getattr(rig, name)) is not None:
             parameters[name] = _mount(mount, with_position=name != "inclinometer")
+    if rig.vehicle is not None:
+        parameters["vehicle"] = {f.name: getattr(rig.vehicle, f.name).tolist() for f in fields(rig.vehicle)}
     if rig.noise:
         parameters["noise"] = {name: float(value) for name, value in rig.noise.items()}
     parameters["tolerance"] = {name: float(value) for name, value in rig.tolerance.items()}

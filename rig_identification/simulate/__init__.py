@@ -1,6 +1,6 @@
 """Simulator: the estimator's own forward model, with sensors, noise and a rig not quite as described."""
 
-from rig_identification.simulate.exciter import UnbalancedMass
+from rig_identification.simulate.exciter import Multisine, UnbalancedMass
 from rig_identification.simulate.session import Truth, simulate_session
 from rig_identification.simulate.spec import RunSpec, SampleRates, SessionSpec, StaticSpec
 from rig_identification.simulate.start import AtRest, Posed, Pulled
@@ -8,6 +8,7 @@ from rig_identification.simulate.thesis_case import case_spec
 
 __all__ = [
     "AtRest",
+    "Multisine",
     "Posed",
     "Pulled",
     "RunSpec",

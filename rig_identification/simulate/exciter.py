@@ -70,3 +70,31 @@ class UnbalancedMass:
         force[:, first] = outward * np.cos(angle) - across * np.sin(angle)
         force[:, second] = outward * np.sin(angle) + across * np.cos(angle)
         return force
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """A sum of sines along each axis of the exciter frame, for an exciter that gives any force.
+
+    Phases are Schroeder's (IEEE Trans. Inf. Theory 16, 1970), which keep the sum's peak low, and differ from
+    axis to axis. The force rises over ``ramp`` seconds as 3 u^2 - 2 u^3, so that it has no jump.
+    """
+
+    largest: float  # N, that no axis' force exceeds
+    frequencies: tuple[float, ...]  # Hz
+    ramp: float = 0.0  # s
+    axes: str = "exciter"
+
+    def __call__(self, time: Array) -> Array:
+        """(n, 3) N at the times (n,) s, exciter frame."""
+        count = len(self.frequencies)
+        order = np.arange(count)
+        force = np.zeros((time.size, 3))
+        for axis in range(3):
+            phase = -np.pi * order * (order + 1) / count + 2.0 * np.pi * axis / 3.0
+            angles = 2.0 * np.pi * np.outer(time, self.frequencies) + phase
+            force[:, axis] = np.sum(np.sin(angles), axis=1) * self.largest / count
+        if self.ramp <= 0.0:
+            return force
+        u = np.clip(time / self.ramp, 0.0, 1.0)
+        return np.asarray((3.0 * u**2 - 2.0 * u**3)[:, None] * force)

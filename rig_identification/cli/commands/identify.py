@@ -77,29 +77,32 @@ def identify_session(
         printed, marked as interrupted; before, the folder is as it was.
     """
     from rig_identification.identification import identify_prepared, prepare
+    from rig_identification.session.provenance import file_digests
 
     check_output_folder(out, (RESULT, REPORT))
     with StageProgress(sys.stderr) as progress:
         raw = read_recorded(path, namespace, topics or {}, progress)
+        files = file_digests(path, watched(progress))
         prepared = prepare(raw, watched(progress))
         try:
             identification = identify_prepared(prepared, progress, work)
         except Interrupted as stopped:
             identification = stopped.answer
         progress("writing the report")
-        _write(identification, prepared.session, out)
+        _write(identification, prepared.session, files, out)
     _print(identification, out, remark)
     if identification.interrupted:
         raise KeyboardInterrupt("interrupted: result and report hold the best answer until then")
 
 
-def _write(identification: Identification, session: Session, out: Path) -> None:
-    from rig_identification.report import write_report, write_result
+def _write(identification: Identification, session: Session, files: dict[str, str], out: Path) -> None:
+    from rig_identification.report import provenance, write_report, write_result
 
+    origin = provenance(session, files)
     write_together(
         out,
         {
-            RESULT: lambda path: write_result(identification, path),
+            RESULT: lambda path: write_result(identification, path, origin),
             REPORT: lambda path: write_report(identification, session, path),
         },
     )

@@ -75,7 +75,7 @@ def hung(arguments: argparse.Namespace) -> tuple[Rig, Array]:
     if arguments.body is not None:
         elements = np.array(arguments.body, dtype=float)
     elif arguments.result is not None:
-        elements = np.array(_found(arguments.result), dtype=float)
+        elements = np.array(found_elements(arguments.result), dtype=float)
     else:
         raise InputError("--body, --result: a rig description says nothing of the inertia; give one of them")
     if not can_exist(elements):
@@ -83,18 +83,21 @@ def hung(arguments: argparse.Namespace) -> tuple[Rig, Array]:
     return rig, elements
 
 
-def _found(path: Path) -> list[float]:
-    """The ten numbers of a ``result.json``."""
+def found_elements(path: Path, option: str = "--result") -> list[float]:
+    """The ten numbers of a ``result.json``. option: names it in messages.
+
+    Raises InputError where it has none.
+    """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         mass, center, inertia = (document[name]["value"] for name in ("mass", "center_of_mass", "inertia"))
         upper: list[Any] = [inertia[i][j] for i in range(3) for j in range(i, 3)]
         values = [mass, *center, *upper]
     except OSError as error:
-        raise InputError(f"--result {path}: {error.strerror or error}") from error
+        raise InputError(f"{option} {path}: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(f"--result {path}: is no result.json of identify") from error
+        raise InputError(f"{option} {path}: is no result.json of identify") from error
     missing = [name for name, value in zip(ELEMENTS, values, strict=False) if value is None]
     if missing:
-        raise InputError(f"--result {path}: {', '.join(missing)} not determined; give all ten with --body")
+        raise InputError(f"{option} {path}: {', '.join(missing)} not determined; give all ten with --body")
     return [float(value) for value in values]

@@ -1,0 +1,7 @@
+"""Before the body hangs: what a session would tell, which runs tell most, and what would bias them."""
+
+from rig_identification.plan.guess import box
+from rig_identification.plan.means import Means
+from rig_identification.plan.planning import Plan, plan
+
+__all__ = ["Means", "Plan", "box", "plan"]
