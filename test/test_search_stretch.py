@@ -30,7 +30,8 @@ def whole() -> Rung:
     problem, theta, held = pose_problem(simulate_session(spec, np.random.default_rng(5))[0])
     start = _begun(problem, theta, held, _silent)
     rung = begun(start.problem, start.point)
-    assert rung is not None and not rung.alone
+    assert rung is not None
+    assert not rung.alone
     return rung
 
 
@@ -60,7 +61,7 @@ def test_what_was_found_in_a_part_is_carried_over_to_whole_runs(whole: Rung) -> 
 
 
 def test_wide_nodes_hold_the_same_motion_and_force() -> None:
-    session, truth = simulate_session(shaken(3, 6.0), np.random.default_rng(3))
+    session, _ = simulate_session(shaken(3, 6.0), np.random.default_rng(3))
     problem, theta, held = pose_problem(session)
     start = _begun(problem, theta, held, _silent)
     fine = prepare(session.rig, start.problem.runs[0].recording, 0.005)
@@ -70,6 +71,7 @@ def test_wide_nodes_hold_the_same_motion_and_force() -> None:
     forces = [drive(run, start.problem.bench.parameters, start.point.theta).force for run in (fine, wide)]
     np.testing.assert_allclose(forces[1], forces[0][::2])
     at = [evaluate(replace(start.problem, runs=(run,)), start.point) for run in (fine, wide)]
-    assert at[0] is not None and at[1] is not None
+    assert at[0] is not None
+    assert at[1] is not None
     ends = [e.runs[0].motion.states[:, :3] for e in at]
     assert np.max(np.abs(ends[1] - ends[0][::2][: len(ends[1])])) < 1e-5
