@@ -20,16 +20,30 @@ FORCES = frozenset({"tension", "specific_force"})
 
 
 def swing_period(run: Run) -> float:
-    """Period (s) of the strongest line, each axis in units of its noise."""
+    """Period (s) of the strongest line, each axis in units of its noise.
+
+    Between the lines of the spectrum it is found by a parabola through the logarithms of three.
+    """
     best, period = 0.0, LOCAL
     for c in run.channels:
         step = (c.time[-1] - c.time[0]) / max(c.time.size - 1, 1)
         centred = (c.values - np.mean(c.values, axis=0)) / c.noise
         power = np.abs(np.fft.rfft(centred * np.hanning(c.time.size)[:, None], axis=0))
         line = int(np.argmax(np.max(power[1:], axis=1))) + 1
-        if np.max(power[line]) > best:
-            best, period = float(np.max(power[line])), step * c.time.size / line
+        loudest = int(np.argmax(power[line]))
+        if power[line, loudest] > best:
+            at = line + _between(power[:, loudest], line)
+            best, period = float(power[line, loudest]), step * c.time.size / at
     return max(period, LOCAL)
+
+
+def _between(power: Array, line: int) -> float:
+    """How far, in lines, the peak lies from the highest ``line`` of a spectrum's magnitudes."""
+    if not 1 < line < power.size - 1:
+        return 0.0
+    below, top, above = np.log(np.maximum(power[line - 1 : line + 2], 1e-300))
+    bend = below - 2.0 * top + above
+    return float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def long_enough(run: Run, seconds: float) -> float:
@@ -39,18 +53,24 @@ def long_enough(run: Run, seconds: float) -> float:
     return max(seconds, min(SWINGS * swing_period(run), run.grid.duration))
 
 
-def beside_a_swing(time: Array, values: Array, period: float) -> Array:
-    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell."""
+def beside_a_swing(time: Array, values: Array, period: float, lines: tuple[float, ...] = ()) -> Array:
+    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell.
+
+    lines: Hz, of what a device may read besides.
+    """
     block = np.floor((time - time[0]) / (FOLLOWED * period)).astype(np.int64)
     total, freedom = np.zeros(values.shape[1]), 0
     for number in np.unique(block):
         t = time[block == number] / period
-        if t.size < 12:
+        if t.size < 12 + 2 * len(lines):
             continue
         t = t - np.mean(t)
         angle = 2.0 * np.pi * t
         line = np.stack([np.ones_like(t), np.cos(angle), np.sin(angle)], axis=1)
-        basis = np.linalg.qr(np.concatenate([line, t[:, None] * line], axis=1))[0]
+        others = [f(2.0 * np.pi * hertz * period * t) for hertz in lines for f in (np.cos, np.sin)]
+        basis = np.linalg.qr(
+            np.concatenate([line, t[:, None] * line, *(o[:, None] for o in others)], axis=1)
+        )[0]
         rest = values[block == number] - basis @ (basis.T @ values[block == number])
         total, freedom = total + np.sum(rest**2, axis=0), freedom + t.size - basis.shape[1]
     return np.asarray(np.sqrt(total / max(freedom, 1)))
