@@ -28,8 +28,18 @@ from rig_identification.result import InertialEstimate, TextbookAnswer
 
 Array = NDArray[np.float64]
 
+UNIT = "kg*m^2"
 #: Names of the formulas by the number of threads.
 NAMES = {2: "bifilar", 3: "trifilar"}
+#: rad, of the widest turn, below which a line about the vertical may be what leaks from swinging beside: half
+#: a degree. Who times a turning sets it off by degrees.
+TURNED = 0.01
+#: What the formula knows nothing of, on any rig.
+LEAVES_OUT = (
+    "a centre of mass beside the middle of the threads (Jzz falls by the share e²/r²)",
+    "what damps the turning, and the air that turns along",
+    "errors of the described lengths and distances that the swing itself shows",
+)
 
 
 def textbook_answers(problem: Problem, body: InertialEstimate) -> tuple[TextbookAnswer, ...]:
@@ -40,48 +50,48 @@ def textbook_answers(problem: Problem, body: InertialEstimate) -> tuple[Textbook
     threads = alike_threads(problem.bench.rig)
     if threads is None:
         return ()
-    mass = problem.mass or (float(body.values[0]), float(np.sqrt(body.covariance[0, 0])))
-    gravity = problem.bench.rig.gravity
-    seen = [swing for run in problem.runs for swing in _turns(problem, run, threads)]
-    if not seen:
+    free = [run for run in problem.runs if run.force is None]
+    seen = [swing for run in free for swing in _turns(problem, run, threads)]
+    if not seen or max(swing.amplitude for swing in seen) < TURNED:
         return ()
+    mass = problem.mass or (float(body.values[0]), float(np.sqrt(body.covariance[0, 0])))
+    return (_answer(threads, mass, problem.bench.rig.gravity, seen),)
+
+
+def _answer(
+    threads: AlikeThreads, mass: tuple[float, float], gravity: float, seen: list[FreeSwing]
+) -> TextbookAnswer:
     frequency, std = _common(seen)
     value = mass[0] * gravity * threads.product / (threads.height * frequency**2)
     shares = {
-        "period": 2.0 * std / frequency,
-        "mass": mass[1] / mass[0],
-        "distances": threads.product_share,
-        "length": threads.height_share,
+        "period": value * 2.0 * std / frequency,
+        "mass": value * mass[1] / mass[0],
+        "distances": value * threads.product_share,
+        "length": value * threads.height_share,
     }
-    total = value * float(np.sqrt(sum(share**2 for share in shares.values())))
-    name = NAMES.get(threads.count, f"{threads.count} threads")
+    total = float(np.sqrt(sum(share**2 for share in shares.values())))
+    name = NAMES.get(threads.count, f"{threads.count}-thread")
     period = 2.0 * np.pi / frequency
     widest = max(swing.amplitude for swing in seen)
     longer = _kappa(threads, gravity, frequency) * widest**2
     text = (
-        f"The {name} formula J = m g R r / (h ω²) makes Jzz {with_interval(value, total, 'kg m²')} of a "
+        f"The {name} formula J = m g R r / (h ω²) makes Jzz {with_interval(value, total, UNIT)} of a "
         f"period of {with_interval(period, period * std / frequency, 's')} at small turns. At the widest "
         f"turn, {np.degrees(widest):.2g}°, a swing takes {100.0 * longer:.2g} % longer, which is taken off."
     )
-    return (
-        TextbookAnswer(
-            name,
-            "Jzz",
-            float(value),
-            total,
-            "kg m^2",
-            float(period),
-            float(period * std / frequency),
-            float(widest),
-            float(np.mean([swing.decay for swing in seen])),
-            {key: float(value * share) for key, share in shares.items()},
-            text,
-            (
-                "a centre of mass beside the middle of the threads (Jzz falls by the share e²/r²)",
-                "what damps the turning, and the air that turns along",
-                "errors of the described lengths and distances that the swing itself shows",
-            ),
-        ),
+    return TextbookAnswer(
+        name,
+        "Jzz",
+        float(value),
+        total,
+        UNIT,
+        float(period),
+        float(period * std / frequency),
+        float(widest),
+        float(np.mean([swing.decay for swing in seen])),
+        {key: float(share) for key, share in shares.items()},
+        text,
+        LEAVES_OUT,
     )
 
 

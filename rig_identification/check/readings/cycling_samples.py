@@ -204,7 +204,7 @@ def _averaged(channel: RawChannel, n: int) -> RawChannel:
     begun = (places[whole] - places[0]) % n == 0
     whole = whole[begun & (places[whole + n - 1] - places[whole] == n - 1)]
     each = whole[:, None] + np.arange(n)
-    values = np.mean(channel.values[each], axis=1)
+    values = np.mean(_one_sign(channel)[each], axis=1)
     stamps = channel.stamp_ns[each]
     taken = stamps[:, 0] + np.rint(np.mean(stamps - stamps[:, :1], axis=1)).astype(np.int64)
     beside = np.diff(whole) == n
@@ -219,6 +219,17 @@ def _averaged(channel: RawChannel, n: int) -> RawChannel:
         received_ns=channel.received_ns[each[:, -1]],
         values=values - 0.5 * spread * bends / n**2,
     )
+
+
+def _one_sign(channel: RawChannel) -> Array:
+    """(n, w) values; of quaternions the sign that is nearer to the sample before."""
+    values = channel.values
+    if channel.channel != "mocap":
+        return values
+    turned = np.sum(values[1:, 3:] * values[:-1, 3:], axis=1) < 0.0
+    values = values.copy()
+    values[:, 3:] *= np.cumprod(np.concatenate([[1.0], np.where(turned, -1.0, 1.0)]))[:, None]
+    return values
 
 
 def _fault(session: RawSession, group: list[Spotted]) -> SetupFault:
