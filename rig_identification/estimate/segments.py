@@ -24,9 +24,7 @@ from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import CannotBeFollowed, Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.swing_period import beside_a_swing, long_enough, swing_period
-from rig_identification.estimate.unseen_sway import lines_beside
 from rig_identification.model.motion import State
-from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -147,7 +145,7 @@ def _swing(run: Run, cut: tuple[Run, ...]) -> Array:
     return np.asarray(np.maximum(np.array(out), 1e-12))
 
 
-def with_noise_of_swing(run: Run, rig: Rig) -> Run:
+def with_noise_of_swing(run: Run) -> Run:
     """The run with each noise that was estimated as large as a smooth swing shows it.
 
     Neighbouring samples show a tracker's white noise alone. What wanders with the pose (markers
@@ -160,7 +158,7 @@ def with_noise_of_swing(run: Run, rig: Rig) -> Run:
         often = c.time.size / run.grid.duration * 0.25 * period > FITTED_SAMPLES
         if often:
             return sample_noise_std(c.time, c.values, 0.25 * period)
-        return beside_a_swing(c.time, c.values, period, lines_beside(rig, run, 1.0 / period))
+        return beside_a_swing(c.time, c.values, period)
 
     return replace(
         run,

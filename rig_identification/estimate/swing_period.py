@@ -53,24 +53,18 @@ def long_enough(run: Run, seconds: float) -> float:
     return max(seconds, min(SWINGS * swing_period(run), run.grid.duration))
 
 
-def beside_a_swing(time: Array, values: Array, period: float, lines: tuple[float, ...] = ()) -> Array:
-    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell.
-
-    lines: Hz, of what a device may read besides.
-    """
+def beside_a_swing(time: Array, values: Array, period: float) -> Array:
+    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell."""
     block = np.floor((time - time[0]) / (FOLLOWED * period)).astype(np.int64)
     total, freedom = np.zeros(values.shape[1]), 0
     for number in np.unique(block):
         t = time[block == number] / period
-        if t.size < 12 + 2 * len(lines):
+        if t.size < 12:
             continue
         t = t - np.mean(t)
         angle = 2.0 * np.pi * t
         line = np.stack([np.ones_like(t), np.cos(angle), np.sin(angle)], axis=1)
-        others = [f(2.0 * np.pi * hertz * period * t) for hertz in lines for f in (np.cos, np.sin)]
-        basis = np.linalg.qr(
-            np.concatenate([line, t[:, None] * line, *(o[:, None] for o in others)], axis=1)
-        )[0]
+        basis = np.linalg.qr(np.concatenate([line, t[:, None] * line], axis=1))[0]
         rest = values[block == number] - basis @ (basis.T @ values[block == number])
         total, freedom = total + np.sum(rest**2, axis=0), freedom + t.size - basis.shape[1]
     return np.asarray(np.sqrt(total / max(freedom, 1)))

@@ -40,14 +40,6 @@ def sway_frequency(rig: Rig) -> float | None:
     return None if threads is None else float(np.sqrt(rig.gravity / threads.height) / (2.0 * np.pi))
 
 
-def lines_beside(rig: Rig, run: Run, turning: float) -> tuple[float, ...]:
-    """Hz, of the lines that the shapes have; none where there are no shapes. turning: Hz, of the turn."""
-    sway = sway_frequency(rig)
-    if sway is None or not one_turn(run):
-        return ()
-    return sway, turning + sway, abs(turning - sway), 2.0 * turning
-
-
 def sway_shapes(rig: Rig, run: Run, channel: Channel) -> Array | None:
     """(N, 5) what a channel may read at the nodes, each column for one std; None where nothing can swing."""
     frequency = sway_frequency(rig)
