@@ -296,10 +296,9 @@ def _vertical_turn(recording: Recording) -> Series | None:
     for series, z in ((recording.imu, 2), (recording.mocap, 5)):
         if series is None:
             continue
-        known = np.isfinite(series.values).any(axis=0)
-        if series is recording.mocap:
-            known[6] = False
-        if np.flatnonzero(known).tolist() != [z]:
+        known = {int(k) for k in np.flatnonzero(np.isfinite(series.values).any(axis=0))}
+        # A quaternion's fourth number belongs to each of the three
+        if known - ({6} if series is recording.mocap else set()) != {z}:
             return None
         kept = np.isfinite(series.values[:, z])
         found.append(Series(series.time[kept], series.values[kept][:, [z]]))
@@ -311,7 +310,7 @@ def _period(series: Series) -> float:
     centred = series.values[:, 0] - np.mean(series.values[:, 0])
     power = np.abs(np.fft.rfft(centred * np.hanning(centred.size)))
     step = float(series.time[-1] - series.time[0]) / (centred.size - 1)
-    return step * centred.size / (int(np.argmax(power[1:])) + 1)
+    return float(step * centred.size / (int(np.argmax(power[1:])) + 1))
 
 
 def _only_turns(recording: Recording) -> bool:

@@ -45,7 +45,7 @@ def sway_shapes(rig: Rig, run: Run, channel: Channel) -> Array | None:
     frequency = sway_frequency(rig)
     if frequency is None or not one_turn(run):
         return None
-    nodes = run.grid.step * np.arange(run.grid.nodes)
+    nodes = run.grid.step * np.arange(run.grid.nodes, dtype=np.float64)
     angle = 2.0 * np.pi * frequency * nodes
     swing = SWING * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     turn = _turn_of(channel, nodes)[:, None]

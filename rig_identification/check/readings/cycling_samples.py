@@ -110,7 +110,7 @@ def _places(channel: RawChannel) -> Indices:
     step = interval(channel)
     if step <= 0.0:
         return np.arange(len(channel.stamp_ns))
-    return np.rint((channel.stamp_ns - channel.stamp_ns[0]) / (step * 1e9)).astype(np.int64)
+    return np.asarray(np.rint((channel.stamp_ns - channel.stamp_ns[0]) / (step * 1e9)), dtype=np.int64)
 
 
 def _of_column(column: Array, places: Indices) -> _Cycle | None:
@@ -229,7 +229,7 @@ def _one_sign(channel: RawChannel) -> Array:
     turned = np.sum(values[1:, 3:] * values[:-1, 3:], axis=1) < 0.0
     values = values.copy()
     values[:, 3:] *= np.cumprod(np.concatenate([[1.0], np.where(turned, -1.0, 1.0)]))[:, None]
-    return values
+    return np.asarray(values)
 
 
 def _fault(session: RawSession, group: list[Spotted]) -> SetupFault:
