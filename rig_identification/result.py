@@ -100,6 +100,24 @@ class Mismatch:
 
 
 @dataclass(frozen=True)
+class TextbookAnswer:
+    """What a formula that everyone knows makes of the same recordings, beside the whole model's answer."""
+
+    formula: str  # "bifilar", "trifilar", ...
+    element: str  # of ELEMENTS
+    value: float
+    std: float
+    unit: str
+    period: float  # s, at small amplitudes and without damping
+    period_std: float  # s
+    amplitude: float  # rad, the widest that was used
+    decay: float  # 1/s, of the amplitude
+    shares: dict[str, float]  # part of std that comes from each thing measured, in the unit of value
+    text: str  # a sentence or two for a person
+    leaves_out: tuple[str, ...]  # what the formula knows nothing of
+
+
+@dataclass(frozen=True)
 class Work:
     """What an answer took, in units of work (model/work.py): a count, the same on every machine."""
 
@@ -135,6 +153,7 @@ class Identification:
     examination: Examination | None = None  # of the set-up, before anything was fitted; None: there was none
     work: Work | None = None  # of the fit and the search; None: not counted
     vehicle: tuple[Quantity, ...] = ()  # what follows of the body alone for a vehicle (estimate/vehicle.py)
+    textbook: tuple[TextbookAnswer, ...] = ()  # what formulas make of the fitted runs
     interrupted: bool = False  # whether the user broke the search off: the best answer until then
     joint: JointInformation | None = (
         None  # body and rig together; None: the model leaves something, or no fit

@@ -46,7 +46,8 @@ def test_the_words_of_the_table_stay() -> None:
     """A finding's word is an interface: none may go or be renamed."""
     assert {
         "unit", "axes", "wiring", "zeroed_cell", "wrapped_counts", "saturation", "frozen_channel",
-        "zero_filled", "spikes", "held_samples", "averaged_samples", "stamp_error", "dummy_error",
+        "zero_filled", "spikes", "held_samples", "averaged_samples", "cycling_samples",
+        "stamp_error", "dummy_error",
         "mass_error",
         "imu_bias", "cable_slack", "load_cell_gain", "unknown",
     } <= table_words()  # fmt: skip

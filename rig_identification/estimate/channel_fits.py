@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import AXES, Channel, Run, axis_name
 from rig_identification.estimate.lag import lagged
-from rig_identification.estimate.prediction import Linearised, smoothed
+from rig_identification.estimate.prediction import Linearised, seen_of_sway, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
 from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.unseen_sway import likeliest_sway
 from rig_identification.result import ChannelFit
 
 Array = NDArray[np.float64]
@@ -30,12 +31,17 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
     corrections = node_corrections(linearised)
     places, own = problem.bench.parameters.places, problem.bench.parameters.device(theta)
     fits = []
-    for channel in run.channels:
+    sway = seen_of_sway(problem.bench, run, linearised.channel, linearised.variance)
+    for index, channel in enumerate(run.channels):
         reading = linearised.readings[channel.device]
         nodes = reading.values[:, channel.columns]
         if corrections is not None:
             nodes = nodes + np.einsum("nij,nj->ni", reading.in_raw[:, channel.columns], corrections)
         nodes = lagged(run.grid.step, own[places.lag(channel.device)], nodes)
+        if index in sway:
+            rows, (shapes, seen) = linearised.channel == index, sway[index]
+            left = linearised.plain[rows] / np.sqrt(linearised.variance[rows])
+            nodes = nodes + (shapes @ likeliest_sway(seen, left))[:, None]
         late = own[places.clock(channel.device)]
         each = np.arange(channel.time.size)
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)

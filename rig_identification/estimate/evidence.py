@@ -42,6 +42,10 @@ FOLLOWED, FOLLOWED_AT_WORST = 0.1, 1.0
 #: Node spacing where a run is only watched: no device follows more than the swing itself, whose pose a
 #: cubic through such nodes holds to 1e-4 at 1.5 Hz.
 WATCHED_NODE_STEP = 0.025
+#: Nodes in a swing where nothing but the turn about the vertical is measured, and their longest spacing (s).
+#: A Runge-Kutta step keeps the swing's frequency to (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6.
+#: What the body does faster, rolling at some hertz, no such device feels.
+SWING_NODES, LONGEST_NODE_STEP = 64.0, 0.1
 #: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).
 MARGIN = 0.02
 #: Between two gaps of the force a shorter part (s) tells hardly more than its own start state.
@@ -274,13 +278,39 @@ def node_step(rig: Rig, recording: Recording) -> float:
     """Node spacing (s) that a recording's fastest device needs."""
     if _only_turns(recording):
         # What a cubic through such nodes does not follow, no swing of a rigid body is either
-        return WATCHED_NODE_STEP
+        turn = _vertical_turn(recording)
+        if turn is None:
+            return WATCHED_NODE_STEP
+        return float(np.clip(_period(turn) / SWING_NODES, WATCHED_NODE_STEP, LONGEST_NODE_STEP))
     held = _force_step(rig, recording)
     if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
         return held
     if recording.duration > LONG_RUN or _all_follow(rig, recording, WIDE_NODE_STEP):
         return WIDE_NODE_STEP
     return NODE_STEP
+
+
+def _vertical_turn(recording: Recording) -> Series | None:
+    """The turn about z, or its rate, where that is all that was measured."""
+    found: list[Series] = []
+    for series, z in ((recording.imu, 2), (recording.mocap, 5)):
+        if series is None:
+            continue
+        known = {int(k) for k in np.flatnonzero(np.isfinite(series.values).any(axis=0))}
+        # A quaternion's fourth number belongs to each of the three
+        if known - ({6} if series is recording.mocap else set()) != {z}:
+            return None
+        kept = np.isfinite(series.values[:, z])
+        found.append(Series(series.time[kept], series.values[kept][:, [z]]))
+    return found[0] if len(found) == 1 and found[0].time.size >= 16 else None
+
+
+def _period(series: Series) -> float:
+    """Period (s) of the strongest line of samples (n, 1)."""
+    centred = series.values[:, 0] - np.mean(series.values[:, 0])
+    power = np.abs(np.fft.rfft(centred * np.hanning(centred.size)))
+    step = float(series.time[-1] - series.time[0]) / (centred.size - 1)
+    return float(step * centred.size / (int(np.argmax(power[1:])) + 1))
 
 
 def _only_turns(recording: Recording) -> bool:

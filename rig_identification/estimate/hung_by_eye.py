@@ -19,6 +19,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.rest_evidence import RestEvidence
 from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.unseen_sway import one_turn
 
 Array = NDArray[np.float64]
 
@@ -29,8 +30,11 @@ BESIDE = 1.0 / 22.0
 TURNS = frozenset({"orientation", "angular_rate"})
 #: Inertia about the vertical among the ten elements.
 VERTICAL = 9
-#: Entries of the body's vector: the centre of mass along x and y.
-HORIZONTAL = (7, 8)
+#: Entries of the body's vector: the centre of mass along x and y, and its height.
+HORIZONTAL, DEPTH = (7, 8), 9
+#: How deep it hangs, as a share of the rig's extent, one standard deviation about the first guess: one turn
+#: tells nothing of that, and a fit that nothing holds ends a rig's height below the rig.
+DEEP = 0.2
 
 
 def only_turns(runs: tuple[Run, ...], rests: tuple[RestEvidence, ...]) -> bool:
@@ -44,8 +48,10 @@ def hung_by_eye(problem: Problem) -> Problem:
     """The problem with what is believed where nothing that was measured tells: midway, hardly swinging."""
     if not only_turns(problem.runs, problem.rests):
         return problem
-    weak = problem.weak.copy()
-    weak[list(HORIZONTAL)] = BESIDE * float(max(extent(problem.bench.rig)[:2]))
+    weak, size = problem.weak.copy(), extent(problem.bench.rig)
+    weak[list(HORIZONTAL)] = BESIDE * float(max(size[:2]))
+    if all(one_turn(run) for run in problem.runs):
+        weak[DEPTH] = DEEP * float(np.max(size))
     return replace(problem, weak=weak, taken=HORIZONTAL, bench=replace(problem.bench, unseen=True))
 
 

@@ -62,6 +62,7 @@ from rig_identification.estimate.solve import (
 from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
+from rig_identification.estimate.textbook import textbook_answers
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -590,6 +591,7 @@ def compose(
         converged=fitted.converged,
         notes=notes,
         joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
+        textbook=textbook_answers(fitted.problem, alone),
     )
 
 

@@ -36,6 +36,9 @@ INERTIAL = 10
 _SPREADS = slice(1, 4)
 THINNER = 3.0
 AXES = "xyz"
+#: A mount that the description leaves out: position within 10 m, orientation within 1.5 rad.
+UNKNOWN_POSITION = 10.0
+UNKNOWN_ROTATION = 1.5
 
 # Devices and where their numbers start in the flat array ``device`` (see DeviceLayout)
 CLOCK = "clock"
@@ -55,6 +58,11 @@ class Parameter:
     also: tuple[int, ...] = ()  # further entries that hold the same number
     ratio: bool = False  # positive: prior_std is that of its logarithm about the nominal's
     freed: bool = False  # a doubt of the ideal model that is believed no longer
+
+    @property
+    def described(self) -> bool:
+        """Whether the description states it: how a tracker stands in the room has no tolerance to leave."""
+        return self.bounded and self.prior_std not in (UNKNOWN_POSITION, UNKNOWN_ROTATION)
 
     def value(self, position: float) -> float:
         """The number at ``position`` (units of the prior's std) of the optimiser's vector."""
@@ -196,9 +204,6 @@ class DeviceLayout:
 
 #: What shifts the exciter's force in time, alike to first order (prediction.drive).
 EXCITER_TIMES = ("exciter.clock", "exciter.lag")
-#: A mount that the description leaves out: position within 10 m, orientation within 1.5 rad.
-UNKNOWN_POSITION = 10.0
-UNKNOWN_ROTATION = 1.5
 
 
 @dataclass

@@ -20,16 +20,30 @@ FORCES = frozenset({"tension", "specific_force"})
 
 
 def swing_period(run: Run) -> float:
-    """Period (s) of the strongest line, each axis in units of its noise."""
+    """Period (s) of the strongest line, each axis in units of its noise.
+
+    Between the lines of the spectrum it is found by a parabola through the logarithms of three.
+    """
     best, period = 0.0, LOCAL
     for c in run.channels:
         step = (c.time[-1] - c.time[0]) / max(c.time.size - 1, 1)
         centred = (c.values - np.mean(c.values, axis=0)) / c.noise
         power = np.abs(np.fft.rfft(centred * np.hanning(c.time.size)[:, None], axis=0))
         line = int(np.argmax(np.max(power[1:], axis=1))) + 1
-        if np.max(power[line]) > best:
-            best, period = float(np.max(power[line])), step * c.time.size / line
+        loudest = int(np.argmax(power[line]))
+        if power[line, loudest] > best:
+            at = line + _between(power[:, loudest], line)
+            best, period = float(power[line, loudest]), step * c.time.size / at
     return max(period, LOCAL)
+
+
+def _between(power: Array, line: int) -> float:
+    """How far, in lines, the peak lies from the highest ``line`` of a spectrum's magnitudes."""
+    if not 1 < line < power.size - 1:
+        return 0.0
+    below, top, above = np.log(np.maximum(power[line - 1 : line + 2], 1e-300))
+    bend = below - 2.0 * top + above
+    return float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def long_enough(run: Run, seconds: float) -> float:

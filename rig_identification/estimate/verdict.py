@@ -90,7 +90,7 @@ def _pressed(fitted: Fitted, ordinary: float) -> dict[str, float]:
     parameters, evaluation = fitted.problem.bench.parameters, fitted.evaluation
     theta, gradient, information = evaluation.point.theta, evaluation.gradient, evaluation.information
     limit = 0.5 * float(chi2.isf(DOUBTED * FALSE_ALARM / max(HYPOTHESES, len(parameters.free)), 1))
-    doubts = [i for i, p in enumerate(parameters.free, start=INERTIAL) if p.bounded and not p.ratio]
+    doubts = [i for i, p in enumerate(parameters.free, start=INERTIAL) if p.described and not p.ratio]
     held = {i for i in doubts if abs(theta[i]) >= ordinary * (1.0 - 1e-6) and theta[i] * gradient[i] > 0.0}
     out = {}
     for i in doubts:

@@ -28,7 +28,7 @@ from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Notify, damped
 from rig_identification.mismatch.threads import physics_of_pendulums
-from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
+from rig_identification.mismatch.trial import Trial, log_evidence, mass_of, may_be_none
 from rig_identification.result import ELEMENTS, Mismatch
 
 #: How many times as long pieces are: friction shows against the amplitude, which must change within one.
@@ -124,7 +124,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
     fitted = _scored(ideal, heavy, whole, converged)
     evidence_of_all = log_evidence(whole)
-    found = [Trial(c, heavy, whole, evidence_of_all, True) for c in choice.effects]
+    found = _told([Trial(c, heavy, whole, evidence_of_all, True) for c in choice.effects], careful)
     after, verdict = judged(fitted)
     told = estimates(fitted.problem, fitted.evaluation, spread=careful[1])
     evidence = evidence_of(found_ideal, fitted, after.holdout)
@@ -143,6 +143,15 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     hidden = {name for t in found for name in t.candidate.hides}
     lost = hidden | set(testimony(*careful, _missed(fitted, after)))
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
+
+
+def _told(found: list[Trial], careful: tuple[Problem, Evaluation]) -> list[Trial]:
+    """What is told of the effects in the model: no amount that may as well be none, beside one that may not.
+
+    careful: the cautious fit, whose intervals are told.
+    """
+    sure = [t for t in found if not may_be_none(replace(t, problem=careful[0], evaluation=careful[1]))]
+    return sure or found
 
 
 def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:

@@ -22,6 +22,7 @@ from rig_identification.report.rig_drawing import picture_svg, rig_svgs
 from rig_identification.report.rig_scene import rig_scene
 from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
+from rig_identification.report.textbook import textbook_views
 from rig_identification.result import Identification
 
 #: How the topic of a simulation's truth ends (recording contract).
@@ -79,6 +80,7 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "lights": lights(identification),
         "steps": next_steps(identification, session),
         "grade": grade,
+        "textbook": textbook_views(identification),
         "blocks": ten,
         "principal": any(block.principal for block in ten),
         "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},

@@ -19,6 +19,7 @@ from rig_identification.result import (
     InertialEstimate,
     Mismatch,
     Quantity,
+    TextbookAnswer,
     Work,
 )
 
@@ -41,7 +42,8 @@ def result_to_dict(
         ``without_frame`` is None where no frame was described. Where effects were found,
         ``mismatch`` holds one key more, ``ideal_model``: mass, centre of mass, inertia and what is
         unobservable as the ideal model alone has them. Where the session was examined, ``check`` holds
-        what was found before anything was fitted. ``work`` says what the answer took, where it was counted,
+        what was found before anything was fitted. ``textbook`` holds what formulas make of the same
+        runs, where there is one for the rig. ``work`` says what the answer took, where it was counted,
         and ``interrupted`` is there, and true, where the user broke the search off. ``joint`` is what
         sessions are compared and fused by, where the model explains this one. ``budget`` holds the
         variances of the ten numbers by source, where they are told; ``vehicle`` what follows from them.
@@ -54,6 +56,7 @@ def result_to_dict(
         },
         **_vehicle(identification.vehicle),
         **({} if provenance is None else {"provenance": plain(provenance)}),
+        **_textbook(identification.textbook),
         **_work(identification.work),
         **({"interrupted": True} if identification.interrupted else {}),
         **({} if identification.examination is None else {"check": check_part(identification.examination)}),
@@ -139,6 +142,29 @@ def _mismatch(mismatch: Mismatch) -> dict[str, object]:
         "verdict": mismatch.verdict,
         "findings": [_finding(finding) for finding in mismatch.findings],
         "alternatives": plain(mismatch.alternatives),
+    }
+
+
+def _textbook(answers: tuple[TextbookAnswer, ...]) -> dict[str, object]:
+    """What formulas make of the same runs; nothing where none is for such a rig."""
+    if not answers:
+        return {}
+    return {
+        "textbook": [
+            {
+                "formula": a.formula,
+                "element": a.element,
+                "value": a.value,
+                "std": a.std,
+                "unit": a.unit,
+                "period": {"value": a.period, "std": a.period_std, "unit": "s"},
+                "amplitude": {"value": a.amplitude, "unit": "rad"},
+                "decay": {"value": a.decay, "unit": "1/s"},
+                "std_from": dict(a.shares),
+                "leaves_out": list(a.leaves_out),
+            }
+            for a in answers
+        ]
     }
 
 

@@ -24,14 +24,19 @@ from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.solve import CannotBeFollowed
 from rig_identification.estimate.unanswered import unanswered
+from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.vehicle import vehicle_quantities
 from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.gyroscope_heading import gyroscope_heading, heading_told, with_heading
 from rig_identification.mismatch.interference import lines_at_rest, with_lines, without_lines
 from rig_identification.mismatch.overrange import with_overranges
 from rig_identification.mismatch.slack import spells_of
 from rig_identification.mismatch.stretched_at_first import with_stretch_told
+from rig_identification.mismatch.trial import may_be_none
 from rig_identification.mismatch.watched import Watched, explain_watched
+from rig_identification.mismatch.whole_runs import as_fitted
 from rig_identification.model.work import WORK, counted
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Interrupted
@@ -73,11 +78,12 @@ def identify(
     session = session if origins.given else moved(session, origins)
     lines = lines_at_rest(session)
     session = without_lines(session, lines)
+    turned = gyroscope_heading(session)
+    session = with_heading(session, turned)
 
     def ended(found: Identification) -> Identification:
-        found = replace(
-            with_work_told(found), mismatch=with_lines(with_overranges(found.mismatch, session), lines)
-        )
+        told_of = heading_told(with_overranges(found.mismatch, session), turned)
+        found = replace(with_work_told(found), mismatch=with_lines(told_of, lines))
         found = found if origins.given else told(found, origins)
         return replace(found, vehicle=vehicle_quantities(found.without_frame or found.total, given))
 
@@ -139,6 +145,22 @@ def _worth_a_search(watched: Watched) -> bool:
     return watched.mismatch.verdict == "unexplained" and misfit(watched.fitted.evaluation) < HOPELESS_SQUARE
 
 
+def _one_turn(ideal: Ideal) -> bool:
+    """Whether one turn is all that was measured.
+
+    Nothing tells then a part that swings by itself from what the device errs by at the same frequency.
+    """
+    return all(one_turn(run) for run in ideal.fitted.problem.runs)
+
+
+def _firm(found: Explained) -> bool:
+    """Whether no effect of an explanation may as well be none.
+
+    Without force a number that bends to what a tracker errs by gains as much as one that is there.
+    """
+    return not any(may_be_none(as_fitted(found.fitted, trial)) for trial in found.effects)
+
+
 def _identified(
     session: Session, notify: Progress, assumed: Assumed | None, work: float
 ) -> tuple[Identification, Fitted]:
@@ -172,13 +194,15 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
             if not _worth_a_search(watched):
                 return swinging
     found, note = None, None
-    if ideal.fitted.problem.runs:
+    if ideal.fitted.problem.runs and not (ideal.mismatch.verdict != "none" and _one_turn(ideal)):
         try:
             found = explain(ideal, spells_of(ideal.fitted), searching, budget, so_far.hear, so_far.see)
         except (FloatingPointError, np.linalg.LinAlgError) as error:
             note = f"The search for left-out physics ended early ({error}); the ideal model's answer stands."
-    if swinging is not None and (found is None or not (found.wholly or found.mismatch.verdict == "none")):
-        # What damps a swing is no trace: it gives way only to what leaves none
+    if swinging is not None and not (
+        found is not None and (found.mismatch.verdict == "none" or (found.wholly and _firm(found)))
+    ):
+        # What damps a swing is no trace: it gives way only to what leaves none, and is there
         return swinging
     if found is None:
         ideal = so_far.ideal = with_pieces(ideal, searching)
