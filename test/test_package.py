@@ -19,7 +19,10 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "rig_identification"
 NAME = "rig_identification"
 
-VALUES = {"", "errors", "examination", "own", "quantity", "raw", "rig", "recording", "result", "topics"}
+VALUES = {
+    *("", "errors", "examination", "files", "optional", "own", "quantity", "raw", "rig", "recording"),
+    *("result", "topics"),
+}
 CORE = {"model", "estimate", "mismatch", "search", "statics", "live"}
 # What a room may import of the package besides itself and the shared values; the front door may import all.
 ALLOWED = {
@@ -35,9 +38,12 @@ ALLOWED = {
     "thesis_rerun": CORE | {"thesis", "simulate"},
     "thesis_report": CORE | {"thesis", "thesis_rerun", "report"},
     "session": {"cleaning"},
+    "logs": {"session"},
     "report": CORE,
     "live": {"model", "statics", "estimate"},
     "identification": {"check", "cleaning", "search", "session"},
+    "": {"api"},
+    "api": CORE | {"check", "identification", "report", "session", "simulate", "thesis"},
     "nodes": CORE | {"cleaning", "session", "report", "identification"},
 }
 OUTSIDE_THE_CORE = {

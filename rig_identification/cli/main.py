@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from rig_identification import __version__
 from rig_identification.cli import commands
-from rig_identification.errors import InputError, MissingDescription
+from rig_identification.errors import ArgumentError, InputError, MissingDescription
 
 PROGRAM = "rig-identification"
 
@@ -83,7 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             os.environ[VARIABLE] = arguments.effects
         arguments.run(arguments)
     except InputError as error:
-        _say(f"error: {error}")
+        option = "--" if isinstance(error, ArgumentError) else ""
+        _say(f"error: {option}{error}")
         if isinstance(error, MissingDescription):
             _show(error.proposal)
         return UNUSABLE

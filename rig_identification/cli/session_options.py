@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rig_identification.api import Recorded
     from rig_identification.cli.progress import StageProgress
-    from rig_identification.raw import RawSession
 
 
 def add_session_options(parser: argparse.ArgumentParser) -> None:
@@ -17,6 +17,11 @@ def add_session_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", type=Path, metavar="SESSION", help="folder with a session.yaml, or that file"
     )
+    add_topic_options(parser)
+
+
+def add_topic_options(parser: argparse.ArgumentParser) -> None:
+    """Take what the topics are called."""
     parser.add_argument("--namespace", default="/rig", help="namespace of the topics (default: %(default)s)")
     parser.add_argument(
         "--topic",
@@ -28,9 +33,7 @@ def add_session_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read_recorded(
-    path: Path, namespace: str, topics: Mapping[str, str], progress: StageProgress
-) -> RawSession:
+def read_recorded(path: Path, namespace: str, topics: Mapping[str, str], progress: StageProgress) -> Recorded:
     """Every message of the session at ``path``.
 
     Raises
@@ -38,9 +41,9 @@ def read_recorded(
     InputError
         It cannot be read, or no bag holds a topic that ``topics`` names.
     """
-    from rig_identification.session import read_raw
+    from rig_identification.api import read
 
-    return read_raw(path, namespace=namespace, topics=topics, progress=watched(progress))
+    return read(path, namespace=namespace, topics=topics, progress=watched(progress))
 
 
 def watched(progress: StageProgress) -> StageProgress | None:

@@ -13,14 +13,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from rig_identification.cli.output import check_output_folder, write_together
+from rig_identification.api.result import REPORT, RESULT
+from rig_identification.cli.output import check_output_folder, written
 from rig_identification.cli.progress import StageProgress
 from rig_identification.cli.session_options import add_session_options, read_recorded, watched
 from rig_identification.model.work import WORK
-from rig_identification.recording import Session
-from rig_identification.result import Identification, Interrupted
-
-RESULT, REPORT = "result.json", "report.html"
+from rig_identification.result import Identification
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -76,33 +74,22 @@ def identify_session(
         The user broke it off. Once the ideal model is fitted, the best answer until then is written and
         printed, marked as interrupted; before, the folder is as it was.
     """
-    from rig_identification.identification import identify_prepared, prepare
+    from rig_identification.api import Stopped, identify
+    from rig_identification.identification import prepare
 
     check_output_folder(out, (RESULT, REPORT))
     with StageProgress(sys.stderr) as progress:
-        raw = read_recorded(path, namespace, topics or {}, progress)
-        prepared = prepare(raw, watched(progress))
+        recorded = read_recorded(path, namespace, topics or {}, progress)
+        prepared = prepare(recorded.raw, watched(progress))
         try:
-            identification = identify_prepared(prepared, progress, work)
-        except Interrupted as stopped:
-            identification = stopped.answer
+            result = identify(prepared, progress=progress, work=work)
+        except Stopped as stopped:
+            result = stopped.result
         progress("writing the report")
-        _write(identification, prepared.session, out)
-    _print(identification, out, remark)
-    if identification.interrupted:
+        written(result, out)
+    _print(result.identification, out, remark)
+    if result.identification.interrupted:
         raise KeyboardInterrupt("interrupted: result and report hold the best answer until then")
-
-
-def _write(identification: Identification, session: Session, out: Path) -> None:
-    from rig_identification.report import write_report, write_result
-
-    write_together(
-        out,
-        {
-            RESULT: lambda path: write_result(identification, path),
-            REPORT: lambda path: write_report(identification, session, path),
-        },
-    )
 
 
 def _print(identification: Identification, out: Path, remark: Callable[[Identification], str] | None) -> None:
