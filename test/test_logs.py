@@ -122,6 +122,7 @@ def test_without_a_date_logs_stand_apart_and_say_none() -> None:
         ("shaft angle", "deg", "exciter.angle"),
         ("inclinometer_y", "mrad", "inclinometer.y"),
         ("marker_pos_z", "mm", "mocap.position.z"),
+        ("x", "mm", "mocap.position.x"),
         ("qw", "", "mocap.quaternion.w"),
         ("yaw", "deg", "mocap.yaw"),
         ("magnetic rate x", "", None),

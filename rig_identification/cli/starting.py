@@ -126,16 +126,17 @@ def _positions(
             raise InputError(f"--at {device}: is no device with a place; give {', '.join(_PLACED)}")
         found[device] = scale * _numbers(f"--at {device}", numbers)
     for device in held.devices:
-        if device in found or device == _ESTIMATED:
+        if device == _ESTIMATED:
             continue
-        if device in _PLACED and ask:
-            found[device] = scale * _ask_vector(f"Where the {device} sits on the body, x y z", np.zeros(3))
-        else:
+        if device not in found:
             found[device] = np.zeros(3)
-            if device in _PLACED:
-                print(
-                    f"note: {device}: taken to sit at the body's origin; give --at {device} X Y Z, or edit it"
+            if device in _PLACED and ask:
+                found[device] = scale * _ask_vector(
+                    f"Where the {device} sits on the body, x y z", np.zeros(3)
                 )
+            elif device in _PLACED:
+                origin = f"{device}: taken to sit at the body's origin; give --at {device} X Y Z, or edit it"
+                print(f"note: {origin}")
         print(f"note: {device}: taken to be level with the body's axes; if it is not, edit its orientation")
     return found
 

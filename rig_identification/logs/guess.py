@@ -196,7 +196,8 @@ def _kind(words: list[str], si: str) -> str | None:
 
 def _of_unit(si: str, axis: str) -> str | None:
     """What a unit alone says is measured."""
-    kinds = {"rad/s": "angular_rate", "m/s^2": "specific_force"} if axis else {"N": "tension"}
+    of_axes = {"rad/s": "angular_rate", "m/s^2": "specific_force", "m": "mocap"}
+    kinds = of_axes if axis else {"N": "tension"}
     return kinds.get(si)
 
 
