@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import rig_identification as ri
 from rig_identification.cli.main import main
-from rig_identification.rig import Cable, Rig
+from rig_identification.rig import Cable, Mount, Rig
 
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "import.md"
 HEADS = "time (s),x (mm),y (mm),z (mm),roll (deg),pitch (deg),yaw (deg)"
@@ -30,6 +30,7 @@ def bar(duration: float, seed: int) -> ri.Simulated:
         cables=tuple(Cable(name, end + np.array([0.0, 0.0, 1.5]), end, 1.5) for name, end in ends.items()),
         mass=12.0,
         mass_std=0.005,
+        mocap=Mount(np.array([0.4, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0])),
         noise={"mocap_position": 0.0003, "mocap_orientation": 0.001},
     )
     return ri.simulate(

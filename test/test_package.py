@@ -21,7 +21,7 @@ NAME = "rig_identification"
 
 VALUES = {
     *("", "errors", "examination", "files", "optional", "own", "quantity", "raw", "rig", "recording"),
-    *("result", "topics"),
+    *("result", "rig_document", "topics"),
 }
 CORE = {"model", "estimate", "mismatch", "search", "statics", "live"}
 # What a room may import of the package besides itself and the shared values; the front door may import all.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
 #: Files of an answer.
 RESULT, REPORT = "result.json", "report.html"
 UNITS = ("kg", *("m",) * 3, *("kg m^2",) * 6)
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """An inertia tensor with one standard deviation of each element, (3, 3) kg m^2."""
+
+    value: Array
+    std: Array
 
 
 @dataclass(frozen=True)
@@ -172,6 +181,42 @@ class Result:
         fit = named[wanted]
         columns = {"measured": fit.measured, "predicted": fit.predicted, "residual": fit.residual_in_sigma}
         return timed(fit.time, columns)
+
+    def inertia_about(self, point: Sequence[float], axes: Sequence[Sequence[float]] | None = None) -> Inertia:
+        """Inertia about another point of the body, in other axes, with its uncertainty.
+
+        Parameters
+        ----------
+        point : three numbers
+            m, body.
+        axes : (3, 3), optional
+            Columns are the new axes in body; those of body where it is left out.
+
+        Returns
+        -------
+        Inertia
+            ``value`` and ``std``, (3, 3) kg m^2; NaN where an element that they need is not determined.
+        """
+        import numpy as np
+
+        from rig_identification.report.other_point import inertia_about
+
+        turned = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
+        return Inertia(*inertia_about(self.identification.total, np.asarray(point, dtype=float), turned))
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The body as ``URDF``, ``MJCF``, ``SDF`` and ``CSV``; the CSV alone where not all is determined."""
+        from rig_identification.report.body_files import body_files
+
+        return body_files(self.identification.total)
+
+    @property
+    def learned_rig(self) -> str:
+        """A ``rig.yaml`` with hinges, lengths and mounts as estimated."""
+        from rig_identification.report.learned_rig import learned_rig_text
+
+        return learned_rig_text(self.session.rig, self.identification.parameters, self.session.name)
 
     def to_dict(self) -> dict[str, object]:
         """The content of ``result.json``."""

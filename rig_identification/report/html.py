@@ -16,12 +16,13 @@ from rig_identification.report.findings import alternative_views, finding_views,
 from rig_identification.report.grades import grade
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.lights import lights
-from rig_identification.report.page import page_environment
+from rig_identification.report.page import page_environment, script
 from rig_identification.report.residual_views import rms_table, whiteness_views
 from rig_identification.report.rig_drawing import picture_svg, rig_svgs
 from rig_identification.report.rig_scene import rig_scene
 from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
+from rig_identification.report.to_copy import to_copy
 from rig_identification.result import Identification
 
 #: How the topic of a simulation's truth ends (recording contract).
@@ -45,7 +46,10 @@ def render_report(identification: Identification, session: Session) -> str:
     """
     environment, style = page_environment()
     return environment.get_template("report.html.j2").render(
-        style=style, version=__version__, **_chapters(identification, session)
+        style=style,
+        version=__version__,
+        scripts=script(environment, "to_copy.js"),
+        **_chapters(identification, session),
     )
 
 
@@ -90,6 +94,7 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "shifts": shifts(identification),
         "determinations": determinations(identification, session),
         "sensors": sensors_used(session),
+        "copy": to_copy(identification, session),
         "doubts": doubt_groups(identification.parameters),
         "picture": Markup(picture_svg(scene)),
         "views": [(name, Markup(svg)) for name, svg in rig_svgs(scene)],

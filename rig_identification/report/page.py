@@ -6,6 +6,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 
+def script(environment: Environment, *names: str) -> Markup:
+    """Scripts of this package, which a page holds in itself."""
+    assert environment.loader is not None
+    return Markup("\n".join(environment.loader.get_source(environment, name)[0] for name in names))
+
+
 def page_environment() -> tuple[Environment, Markup]:
     """Templates of this package, and the style sheet that a page holds in itself."""
     environment = Environment(
