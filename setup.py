@@ -46,7 +46,11 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.10",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.report": ["templates/*"], f"{NAME}.thesis": ["tables/*"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.report": ["templates/*", "vendored/*/*"],
+        f"{NAME}.thesis": ["tables/*"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -88,6 +92,7 @@ setup(
             "pyulog>=1.0",
             "ruff>=0.17,<0.18",
         ],
+        "browser": ["playwright>=1.40"],
         "docs": ["mkdocs-material>=9.5"],
         "dev": ["exudyn>=1.8", "mujoco>=3.1", "mypy>=1.10"],
     },

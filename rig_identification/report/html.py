@@ -16,10 +16,11 @@ from rig_identification.report.findings import alternative_views, finding_views,
 from rig_identification.report.grades import grade
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.lights import lights
-from rig_identification.report.page import page_environment, script
+from rig_identification.report.page import page_environment, script, vendored
 from rig_identification.report.residual_views import rms_table, whiteness_views
 from rig_identification.report.rig_drawing import picture_svg, rig_svgs
 from rig_identification.report.rig_scene import rig_scene
+from rig_identification.report.samples import samples_json
 from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
 from rig_identification.report.to_copy import to_copy
@@ -48,7 +49,9 @@ def render_report(identification: Identification, session: Session) -> str:
     return environment.get_template("report.html.j2").render(
         style=style,
         version=__version__,
-        scripts=script(environment, "to_copy.js"),
+        scripts=script(environment, "to_copy.js", "explore.js"),
+        library=vendored("uplot", "uPlot.iife.min.js"),
+        library_style=vendored("uplot", "uPlot.min.css"),
         **_chapters(identification, session),
     )
 
@@ -87,6 +90,8 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "principal": any(block.principal for block in ten),
         "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},
         "recordings": recordings,
+        "runs": list(dict.fromkeys(c.recording for c in channels if len(c.time) > 1)),
+        "samples": Markup(samples_json(channels)),
         "rms_rows": rms_table(channels, names),
         "whiteness": [(v, whiteness_views(channels, v.name)) for v in recordings if v.role != "at rest"],
         "findings": finding_views(identification.mismatch, len(faults)),
