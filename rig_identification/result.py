@@ -63,6 +63,16 @@ class ChannelFit:
 
 
 @dataclass(frozen=True)
+class BodyMotion:
+    """Where the fitted model has the body in one run, at a rate for the eye."""
+
+    recording: str
+    time: Array  # (n,) s after the recording's start
+    position: Array  # (n, 3) m, the body's datum in world
+    orientation: Array  # (n, 4) quaternion xyzw, rotates body vectors into world
+
+
+@dataclass(frozen=True)
 class Finding:
     """One piece of physics or one sensor error that the ideal model left out."""
 
@@ -111,6 +121,7 @@ class Identification:
     examination: Examination | None = None  # of the set-up, before anything was fitted; None: there was none
     work: Work | None = None  # of the fit and the search; None: not counted
     interrupted: bool = False  # whether the user broke the search off: the best answer until then
+    motions: tuple[BodyMotion, ...] = ()  # of the runs, or of their parts, in the order of time
 
 
 class Interrupted(KeyboardInterrupt):

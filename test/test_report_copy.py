@@ -123,7 +123,8 @@ def test_a_learned_rig_is_read_back(rig: Rig, tmp_path: Path) -> None:
         learned("cable_2.length", 2.503),
         learned("cable_1.body_point.y", 0.002),
         learned("cable_3.ceiling_point.z", 4.004),
-        learned("imu.position.x", 1.001),
+        learned("imu.position.x", 0.001),
+        learned("exciter.position.z", 0.102),
         *(learned(f"imu.orientation.{axis}", value) for axis, value in zip("xyz", turn, strict=True)),
         learned("imu.gyroscope_bias.x", 0.5),
     )
@@ -135,6 +136,8 @@ def test_a_learned_rig_is_read_back(rig: Rig, tmp_path: Path) -> None:
     assert found.cables[3].length == rig.cables[3].length
     assert found.imu is not None
     assert found.imu.position.tolist() == [1.001, 1.2, 0.4]
+    assert found.exciter is not None
+    assert found.exciter.position.tolist() == [0.3, 1.0, 0.102]
     assert Rotation.from_quat(found.imu.orientation).as_rotvec() == pytest.approx(turn, abs=1e-6)
     assert found.frame is not None
     assert found.mass == rig.mass

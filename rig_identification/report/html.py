@@ -17,8 +17,9 @@ from rig_identification.report.grades import grade
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.lights import lights
 from rig_identification.report.page import page_environment, script, vendored
+from rig_identification.report.replay import replay_json
 from rig_identification.report.residual_views import rms_table, whiteness_views
-from rig_identification.report.rig_drawing import picture_svg, rig_svgs
+from rig_identification.report.rig_drawing import HEIGHT, WIDTH, picture_svg, rig_svgs
 from rig_identification.report.rig_scene import rig_scene
 from rig_identification.report.samples import samples_json
 from rig_identification.report.setup import faulty_parts, setup_view
@@ -49,7 +50,7 @@ def render_report(identification: Identification, session: Session) -> str:
     return environment.get_template("report.html.j2").render(
         style=style,
         version=__version__,
-        scripts=script(environment, "to_copy.js", "explore.js"),
+        scripts=script(environment, "to_copy.js", "explore.js", "replay.js"),
         library=vendored("uplot", "uPlot.iife.min.js"),
         library_style=vendored("uplot", "uPlot.min.css"),
         **_chapters(identification, session),
@@ -89,6 +90,9 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "blocks": ten,
         "principal": any(block.principal for block in ten),
         "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},
+        "poses": Markup(replay_json(session.rig, identification.total, identification.motions)),
+        "played": list(dict.fromkeys(motion.recording for motion in identification.motions)),
+        "drawing": (WIDTH, HEIGHT),
         "recordings": recordings,
         "runs": list(dict.fromkeys(c.recording for c in channels if len(c.time) > 1)),
         "samples": Markup(samples_json(channels)),

@@ -46,12 +46,18 @@ def _cable(cable: Cable, values: Mapping[str, float]) -> Cable:
 
 
 def _mount(name: str, mount: Mount | None, values: Mapping[str, float]) -> Mount | None:
-    """A mount moved and turned: its error turns it in body axes, after the described orientation."""
+    """A mount moved and turned: its error turns it in body axes, after the described orientation.
+
+    Of the IMU the error of its place is estimated, of the exciter the place itself.
+    """
     if mount is None:
         return None
+    position = _vector(f"{name}.position", mount.position, values)
+    if name == "imu":
+        position = mount.position + _vector(f"{name}.position", np.zeros(3), values)
     turn = _vector(f"{name}.orientation", np.zeros(3), values)
     turned = (Rotation.from_rotvec(turn) * Rotation.from_quat(mount.orientation)).as_quat()
-    return Mount(_vector(f"{name}.position", mount.position, values), turned)
+    return Mount(position, turned)
 
 
 def _vector(name: str, described: Vector, values: Mapping[str, float]) -> Vector:
