@@ -92,6 +92,7 @@ setup(
             "pyulog>=1.0",
             "ruff>=0.17,<0.18",
         ],
+        "completion": ["shtab>=1.6"],
         "browser": ["playwright>=1.40"],
         "docs": ["mkdocs-material>=9.5"],
         "dev": ["exudyn>=1.8", "mujoco>=3.1", "mypy>=1.10"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 import types
@@ -379,3 +380,14 @@ def test_a_word_misspelt_has_its_right_one_said(
     assert ended.value.code == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"did you mean {meant}?" in line
+
+
+def test_a_shell_completes_commands_and_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("shtab", reason="pip install '.[completion]'")
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    (tmp_path / "script.sh").write_text(script)
+    if shutil.which("bash"):
+        subprocess.run(["bash", "-n", str(tmp_path / "script.sh")], check=True)
+    assert "--fail-on" in script
+    assert "identify" in script
