@@ -21,6 +21,13 @@ class InputError(RigIdentificationError):
     """
 
 
+class ArgumentError(InputError):
+    """An argument of a function, or the option of a command by the same name, that cannot be used.
+
+    The message begins with the argument's name.
+    """
+
+
 class MissingDescription(InputError):
     """Bags without a session.yaml; ``proposal`` is the text of one that the user may edit and save."""
 

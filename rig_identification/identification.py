@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from rig_identification.check.examine import examine
+from rig_identification.check.examine import Examined, examine
 from rig_identification.errors import InputError
 from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
@@ -24,7 +24,7 @@ class Prepared:
     """A session ready to be identified, and what was wrong with it before."""
 
     session: Session  # corrected and cleaned
-    examination: Examination
+    examination: Examination | None  # None: a session in memory, which nobody wired
 
 
 def prepare(raw: RawSession, progress: Callable[[str], None] | None = None) -> Prepared:
@@ -37,7 +37,11 @@ def prepare(raw: RawSession, progress: Callable[[str], None] | None = None) -> P
     InputError
         What is left cannot be used; the line names the faults that were found too.
     """
-    examined = examine(raw, progress)
+    return prepare_examined(examine(raw, progress))
+
+
+def prepare_examined(examined: Examined) -> Prepared:
+    """Choose the usable samples of a session that is examined. Raises InputError as :func:`prepare`."""
     try:
         return Prepared(clean(examined.session), examined.examination)
     except InputError as error:
@@ -71,8 +75,10 @@ def identify_prepared(
     return with_examination(found, prepared.examination)
 
 
-def with_examination(found: Identification, examination: Examination) -> Identification:
+def with_examination(found: Identification, examination: Examination | None) -> Identification:
     """The answer with the set-up's faults as its first findings, ties as alternatives, warnings as notes."""
+    if examination is None:
+        return found
     return replace(
         found,
         mismatch=_with_faults(found.mismatch, examination.faults),

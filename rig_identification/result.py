@@ -77,6 +77,16 @@ class ChannelFit:
 
 
 @dataclass(frozen=True)
+class BodyMotion:
+    """Where the fitted model has the body in one run, at a rate for the eye."""
+
+    recording: str
+    time: Array  # (n,) s after the recording's start
+    position: Array  # (n, 3) m, the body's datum in world
+    orientation: Array  # (n, 4) quaternion xyzw, rotates body vectors into world
+
+
+@dataclass(frozen=True)
 class Finding:
     """One piece of physics or one sensor error that the ideal model left out."""
 
@@ -158,6 +168,7 @@ class Identification:
     joint: JointInformation | None = (
         None  # body and rig together; None: the model leaves something, or no fit
     )
+    motions: tuple[BodyMotion, ...] = ()  # of the runs, or of their parts, in the order of time
 
 
 class Interrupted(KeyboardInterrupt):

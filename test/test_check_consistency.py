@@ -25,8 +25,8 @@ from rig_identification.cli.commands.demo import demo_spec
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 from rig_identification.rig import Mount, Rig
-from rig_identification.session import read_raw, write_session
-from rig_identification.simulate import SampleRates, simulate_session
+from rig_identification.session import read_raw, read_rig, write_session
+from rig_identification.simulate import Pulled, RunSpec, SampleRates, SessionSpec, simulate_session
 
 Array = NDArray[np.float64]
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -410,3 +410,15 @@ def test_rotations_of_the_trajectory_are_consistent() -> None:
     rate = (turns[:-2].inv() * turns[2:]).as_rotvec() / (2.0 * (time[1] - time[0]))
     np.testing.assert_allclose(at.rate[1:-1], rate, atol=0.01)
     np.testing.assert_allclose(at.rate_change[50:-50], np.gradient(at.rate, time, axis=0)[50:-50], atol=0.05)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_two_parallel_cables_tell_nothing_of_a_trackers_sense(seed: int, tmp_path: Path) -> None:
+    """A body on them moves without stretching them in the first order; what is left is the second order."""
+    rig = read_rig(Path(__file__).parents[1] / "config" / "bifilar.yaml")
+    body = np.array([12.0, 0.4, 0.0, -0.05, 0.09, 0.0, 0.0, 1.1, 0.0, 1.15])
+    run = RunSpec("run_1", 8.0, Pulled(np.array([4.4, 5.5, 0.0]), body[1:4] + np.array([0.12, 0.0, 0.0])))
+    rates = SampleRates(tension=0.0, mocap=60.0)
+    spec = SessionSpec("bar", rig, body, (run,), rates=rates)
+    session, _ = simulate_session(spec, np.random.default_rng(seed))
+    assert told(read_raw(write_session(session, tmp_path / "bar"))) == []

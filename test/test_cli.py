@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 import types
@@ -346,3 +347,52 @@ def test_summary_names_what_is_not_determinable(explained: Identification) -> No
     assert "not determinable" in lines["Jzz"]
     assert "-14.21" in lines["Jxy"]
     assert "explained" in text
+
+
+def test_an_answer_as_json_and_nothing_else(
+    answer: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(None)
+    assert main(["identify", "van", "--out", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((tmp_path / "result.json").read_text())
+    assert main(["identify", "van", "--out", str(tmp_path), "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("words", "status"), [(["unexplained"], 3), (["explained"], 0)])
+def test_a_script_may_fail_on_a_verdict(
+    words: list[str], status: int, answer: Install, identification: Identification, tmp_path: Path
+) -> None:
+    answer(None)
+    object.__setattr__(identification.mismatch, "verdict", "unexplained")
+    assert main(["identify", "van", "--out", str(tmp_path), "--fail-on", *words]) == status
+    assert (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["identfy", "van"], "identify"),
+        (["check", "van", "--jsn"], "--json"),
+        (["identify", "van", "--out", "x", "--fail-on", "unexplaind"], "unexplained"),
+    ],
+)
+def test_a_word_misspelt_has_its_right_one_said(
+    arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"did you mean {meant}?" in line
+
+
+def test_a_shell_completes_commands_and_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("shtab", reason="pip install '.[completion]'")
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    (tmp_path / "script.sh").write_text(script)
+    if shutil.which("bash"):
+        subprocess.run(["bash", "-n", str(tmp_path / "script.sh")], check=True)
+    assert "--fail-on" in script
+    assert "identify" in script

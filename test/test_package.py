@@ -20,7 +20,20 @@ PACKAGE = ROOT / "rig_identification"
 NAME = "rig_identification"
 
 VALUES = {
-    *("", "errors", "examination", "joint", "own", "quantity", "raw", "rig", "recording", "result", "topics")
+    *(
+        "",
+        "errors",
+        "examination",
+        "files",
+        "joint",
+        "optional",
+        "own",
+        "quantity",
+        "raw",
+        "rig",
+        "recording",
+    ),
+    *("result", "rig_document", "topics"),
 }
 CORE = {"model", "estimate", "mismatch", "search", "statics", "live"}
 # What a room may import of the package besides itself and the shared values; the front door may import all.
@@ -39,11 +52,14 @@ ALLOWED = {
     "session": {"cleaning"},
     "several": {"model", "estimate"},
     "batch": {"session"},
+    "logs": {"session"},
     "plan": CORE | {"thesis", "simulate"},
     "plan_report": CORE | {"plan", "simulate", "report"},
     "report": CORE | {"several"},
     "live": {"model", "statics", "estimate"},
     "identification": {"check", "cleaning", "search", "session"},
+    "": {"api"},
+    "api": CORE | {"check", "identification", "report", "session", "simulate", "thesis"},
     "nodes": CORE | {"cleaning", "session", "report", "identification"},
 }
 OUTSIDE_THE_CORE = {

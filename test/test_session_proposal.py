@@ -168,8 +168,8 @@ def test_a_table(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"time,force\n0.0,1.0\n")
     said = refusal(tmp_path / name)
     assert said.startswith("is a table")
-    assert "write its columns into a bag" in said
-    assert f"holds no bag but tables ({name}); write its columns" in refusal(tmp_path)
+    assert "rig-identification import" in said
+    assert f"holds no bag but tables ({name}); make a session of it" in refusal(tmp_path)
 
 
 def test_a_folder_of_nothing_and_a_file_of_nothing(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig_identification.cleaning.channel import IN_PART
 from rig_identification.examination import TopicAccount
 from rig_identification.raw import RawChannel, RawRecording, RawSession, Stamps
 from rig_identification.rig import Rig
@@ -119,7 +120,8 @@ def _unused(channel: RawChannel, rig: Rig, kept: set[str], apart: dict[str, floa
         return f"the rig description has no {channel.device}"
     if channel.topic in apart:
         return f"{shift_text(apart[channel.topic])}: they share no time"
-    if not np.isfinite(channel.values).all(axis=1).any():
+    known = np.isfinite(channel.values)
+    if not (known if channel.channel in IN_PART else known.all(axis=1)).any():
         return "never a number in every field: taken as not measured"
     return ""
 

@@ -26,7 +26,7 @@ COLUMNS: dict[str, tuple[tuple[str | None, str, str | None, str], ...]] = {
     "inclination": tuple(("inclinometer", "inclination", a, "rad") for a in "xy"),
 }
 #: Channels of which a sample is used where any of its numbers was measured.
-_IN_PART = ("imu", "inclination", "mocap")
+IN_PART = ("imu", "inclination", "mocap")
 #: Channels that carry a quaternion in columns 3 to 6.
 _POSES = ("mocap", "ground_truth")
 _POSE_WIDTH = 7
@@ -126,10 +126,10 @@ def _clean(
     notes: tuple[str, ...] = ()
     if topic.channel in _POSES:
         values = _with_unit_quaternions(values)
-    held = _filled(values) if moving and topic.channel in _IN_PART else []
+    held = _filled(values) if moving and topic.channel in IN_PART else []
     values[:, held] = np.nan
     known = np.isfinite(values)
-    finite = known.any(axis=1) if topic.channel in _IN_PART else known.all(axis=1)
+    finite = known.any(axis=1) if topic.channel in IN_PART else known.all(axis=1)
     if not finite.any():
         notes = ("never a number in every field: taken as not measured",)
     elif held:

@@ -1,20 +1,5 @@
 """Case studies of the thesis as a command line names them."""
 
-from __future__ import annotations
+from rig_identification.api.cases import case_named
 
-from typing import TYPE_CHECKING
-
-from rig_identification.errors import InputError
-
-if TYPE_CHECKING:
-    from rig_identification.thesis import Case
-
-
-def case_named(label: str) -> Case:
-    """The case of a label such as ``14`` or ``18b``. Raises InputError for a label that is no single case."""
-    from rig_identification.thesis import load_case
-
-    number, variant = label.rstrip("abcd"), label.lstrip("0123456789")
-    if not number.isdecimal():
-        raise InputError(f"--case {label}: is no case study; give 1 to 17, or 18a to 18d")
-    return load_case(int(number), variant)
+__all__ = ["case_named"]

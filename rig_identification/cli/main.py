@@ -8,6 +8,7 @@ import importlib
 import io
 import os
 import pkgutil
+import re
 import sys
 import traceback
 from collections.abc import Sequence
@@ -19,18 +20,20 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from rig_identification import __version__
 from rig_identification.cli import commands
-from rig_identification.errors import InputError, MissingDescription
+from rig_identification.errors import ArgumentError, InputError, MissingDescription, did_you_mean
 
 PROGRAM = "rig-identification"
 
-SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130  # and status.FAILED, which a command returns
 
 
 class OneLineParser(argparse.ArgumentParser):
     """Says what is wrong with the arguments in one line, like every other error."""
 
     def error(self, message: str) -> NoReturn:
-        """Print one line and leave."""
+        """Print one line and leave; of a word misspelt the line names the right one."""
+        if found := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message):
+            message += did_you_mean(found[1], re.findall(r"[\w-]+", found[2]))
         self.exit(UNUSABLE, f"{PROGRAM}: error: {message}; see {self.prog} --help\n")
 
 
@@ -62,8 +65,19 @@ def build_parser() -> argparse.ArgumentParser:
         subparser.add_argument(
             "--debug", action="store_true", help="show where a defect of this package lies"
         )
-        subparser.set_defaults(run=command.run)
+        subparser.set_defaults(run=command.run, parser=subparser)
     return parser
+
+
+def parsed(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Arguments of a command line; leaves with one line where they are wrong."""
+    arguments, unknown = build_parser().parse_known_args(argv)
+    if unknown:
+        parser: argparse.ArgumentParser = arguments.parser
+        options = [name for action in parser._actions for name in action.option_strings]
+        near = did_you_mean(unknown[0].partition("=")[0], options)
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}{near}")
+    return arguments
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -72,19 +86,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 for a defect of this package; 2 for input that cannot be used; 3 where some sessions of several
-        have no result; 130 where the user interrupted.
+        0; 1 for a defect of this package; 2 for input that cannot be used; 3 where the answer is one that
+        --fail-on names, or some sessions of several have no result; 130 where the user interrupted.
     """
     _accept_any_terminal()
-    arguments = build_parser().parse_args(argv)
+    arguments = parsed(argv)
     try:
         if arguments.effects is not None:
             from rig_identification.own import VARIABLE  # it imports numpy, which --help needs not
 
             os.environ[VARIABLE] = arguments.effects
-        status: int | None = arguments.run(arguments)
+        return arguments.run(arguments) or SUCCESS
     except InputError as error:
-        _say(f"error: {error}")
+        option = "--" if isinstance(error, ArgumentError) else ""
+        _say(f"error: {option}{error}")
         if isinstance(error, MissingDescription):
             _show(error.proposal)
         return UNUSABLE
@@ -99,7 +114,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             traceback.print_exc()
         _say(f"defect: {type(error).__name__}: {error}. Please report it, with the output of --debug")
         return DEFECT
-    return SUCCESS if status is None else status
 
 
 def _say(message: str) -> None:

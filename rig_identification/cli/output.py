@@ -1,16 +1,18 @@
-"""Files that appear together when all are complete, or not at all."""
+"""The folder that ``--out`` names: refused before any work, or filled with all files at once."""
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rig_identification import files
 from rig_identification.errors import InputError
+from rig_identification.files import Writer
 
-Writer = Callable[[Path], None]
+if TYPE_CHECKING:
+    from rig_identification.api import Check, Result
 
 
 def check_output_folder(folder: Path, names: tuple[str, ...]) -> None:
@@ -35,7 +37,7 @@ def _check(folder: Path, names: tuple[str, ...]) -> None:
     for name in names:
         if (folder / name).is_dir():
             raise InputError(f"--out {folder}: {name} in it is a folder; name another folder, or remove it")
-    parent = _nearest_existing(folder)
+    parent = files.nearest_existing(folder)
     if not parent.is_dir():
         raise InputError(f"--out {folder}: {parent} is a file; name another folder")
     try:  # Permissions do not tell of a full disk, a quota or a file system that is read-only.
@@ -48,44 +50,16 @@ def _check(folder: Path, names: tuple[str, ...]) -> None:
 
 
 def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:
-    """Write files aside, on the same file system, and move them into the folder once all are complete.
-
-    Parameters
-    ----------
-    folder : Path
-        Made, with its parents, where it does not exist.
-    writers : mapping
-        File name -> function that writes the file at the path it is given.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be written to, or the disk is full. The folder is as it was.
-    """
-    aside = _nearest_existing(folder) / f".{folder.name}.{os.getpid()}.part"
+    """:func:`rig_identification.files.write_together`, whose fault names the option ``--out``."""
     try:
-        try:
-            aside.mkdir()
-            for name, write in writers.items():
-                write(aside / name)
-            _move(aside, folder, tuple(writers))
-        finally:
-            shutil.rmtree(aside, ignore_errors=True)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"--out {folder}: {reason}; free it or name another folder") from error
+        files.write_together(folder, writers)
+    except InputError as error:
+        raise InputError(f"--out {error}") from error
 
 
-def _move(aside: Path, folder: Path, names: tuple[str, ...]) -> None:
-    if folder.exists():
-        for name in names:
-            os.replace(aside / name, folder / name)
-    else:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        os.rename(aside, folder)
-
-
-def _nearest_existing(folder: Path) -> Path:
-    """The folder itself or the first of its parents that exists."""
-    absolute = folder.absolute()
-    return next(path for path in (absolute, *absolute.parents) if path.exists())
+def written(answer: Check | Result, folder: Path) -> None:
+    """Write an answer's files into the folder. Raises InputError, which names the option."""
+    try:
+        answer.write(folder)
+    except InputError as error:
+        raise InputError(f"--out {error}") from error

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rig_identification.api import Recorded
     from rig_identification.cli.progress import StageProgress
-    from rig_identification.raw import RawSession
 
 
 def add_session_options(
@@ -35,9 +35,7 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read_recorded(
-    path: Path, namespace: str, topics: Mapping[str, str], progress: StageProgress
-) -> RawSession:
+def read_recorded(path: Path, namespace: str, topics: Mapping[str, str], progress: StageProgress) -> Recorded:
     """Every message of the session at ``path``.
 
     Raises
@@ -45,9 +43,9 @@ def read_recorded(
     InputError
         It cannot be read, or no bag holds a topic that ``topics`` names.
     """
-    from rig_identification.session import read_raw
+    from rig_identification.api import read
 
-    return read_raw(path, namespace=namespace, topics=topics, progress=watched(progress))
+    return read(path, namespace=namespace, topics=topics, progress=watched(progress))
 
 
 def watched(progress: StageProgress) -> StageProgress | None:

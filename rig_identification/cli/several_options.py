@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig_identification.cli.commands.identify import RESULT, identify_session
+from rig_identification.api.result import RESULT
+from rig_identification.cli.commands.identify import identify_session
 from rig_identification.errors import InputError
 from rig_identification.several.ties import NEW, Sharing
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import AXES, Channel, Run, axis_name
 from rig_identification.estimate.lag import lagged
@@ -12,7 +13,7 @@ from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearis
 from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.unseen_sway import likeliest_sway
-from rig_identification.result import ChannelFit
+from rig_identification.result import BodyMotion, ChannelFit
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,19 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
         fits += _axes(run.recording.name, channel, np.asarray(value @ nodes), run.offset)
     return fits
+
+
+#: Hz. Smoother than a film; the slowest swing of a rig has many frames still.
+FRAMES = 25.0
+
+
+def run_motion(run: Run, linearised: Linearised) -> BodyMotion:
+    """The body's way in a run as the model moves, for a drawing; the exciter's force error is not in it."""
+    motion, step = linearised.motion, run.grid.step
+    nodes = np.arange(0, motion.nodes, max(1, round(1.0 / (FRAMES * step))))
+    turns = Rotation.from_matrix(motion.R_world_body[nodes])
+    place = motion.states[nodes, :3]
+    return BodyMotion(run.recording.name, np.asarray(run.offset + step * nodes), place, turns.as_quat())
 
 
 def _axes(recording: str, channel: Channel, predicted: Array, offset: float) -> list[ChannelFit]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
 from rig_identification.estimate.cautious import coherence, solve_cautiously
-from rig_identification.estimate.channel_fits import rest_fits, run_fits
+from rig_identification.estimate.channel_fits import rest_fits, run_fits, run_motion
 from rig_identification.estimate.enough import enough, told
 from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
@@ -73,6 +73,7 @@ from rig_identification.model.motion import RigModel, State, rig_model
 from rig_identification.model.sensors import MocapMount
 from rig_identification.recording import Recording, Session
 from rig_identification.result import (
+    BodyMotion,
     ChannelFit,
     Identification,
     Mismatch,
@@ -421,6 +422,7 @@ class Scores:
     channels: tuple[ChannelFit, ...]
     training: float
     holdout: float | None
+    motions: tuple[BodyMotion, ...] = ()
 
 
 def scores(fitted: Fitted) -> Scores:
@@ -436,7 +438,10 @@ def scores(fitted: Fitted) -> Scores:
     held = []
     for run, linearised in zip(fitted.holdout_runs, fitted.holdouts, strict=True):
         held += run_fits(problem, run, linearised, evaluation.point.theta)
-    return Scores((*fits, *still, *held), training, error_in_sigma(held) if held else None)
+    pairs = ((problem.runs, evaluation.runs), (fitted.holdout_runs, fitted.holdouts))
+    motions = [run_motion(*one) for runs, found in pairs for one in zip(runs, found, strict=True)]
+    holdout = error_in_sigma(held) if held else None
+    return Scores((*fits, *still, *held), training, holdout, tuple(motions))
 
 
 @dataclass(frozen=True)
@@ -592,6 +597,7 @@ def compose(
         notes=notes,
         joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
         textbook=textbook_answers(fitted.problem, alone),
+        motions=found.motions,
     )
 
 

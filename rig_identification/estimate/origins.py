@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rig_identification.joint import Doubt, JointInformation
 from rig_identification.recording import Recording, Session
-from rig_identification.result import Finding, Identification, InertialEstimate, ParameterEstimate
+from rig_identification.result import BodyMotion, Finding, Identification, InertialEstimate, ParameterEstimate
 from rig_identification.rig import Mount, Rig
 
 Array = NDArray[np.float64]
@@ -103,7 +104,14 @@ def told(found: Identification, origins: Origins) -> Identification:
         parameters=tuple(_parameter(p, origins) for p in found.parameters),
         figures=figures,
         joint=None if found.joint is None else _joint(found.joint, origins),
+        motions=tuple(_motion(m, origins) for m in found.motions),
     )
+
+
+def _motion(motion: BodyMotion, origins: Origins) -> BodyMotion:
+    """Where the given datum is: the one used lies at ``origins.body`` in the given axes."""
+    turned = Rotation.from_quat(motion.orientation).apply(origins.body)
+    return replace(motion, position=motion.position + origins.world - turned)
 
 
 def _body(estimate: InertialEstimate, origins: Origins) -> InertialEstimate:

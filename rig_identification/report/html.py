@@ -16,13 +16,16 @@ from rig_identification.report.findings import alternative_views, finding_views,
 from rig_identification.report.grades import grade
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.lights import lights
-from rig_identification.report.page import page_environment
+from rig_identification.report.page import page_environment, script, vendored
+from rig_identification.report.replay import replay_json
 from rig_identification.report.residual_views import rms_table, whiteness_views
-from rig_identification.report.rig_drawing import picture_svg, rig_svgs
+from rig_identification.report.rig_drawing import HEIGHT, WIDTH, picture_svg, rig_svgs
 from rig_identification.report.rig_scene import rig_scene
+from rig_identification.report.samples import samples_json
 from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
 from rig_identification.report.textbook import textbook_views
+from rig_identification.report.to_copy import to_copy
 from rig_identification.result import Identification
 
 #: How the topic of a simulation's truth ends (recording contract).
@@ -46,7 +49,12 @@ def render_report(identification: Identification, session: Session) -> str:
     """
     environment, style = page_environment()
     return environment.get_template("report.html.j2").render(
-        style=style, version=__version__, **_chapters(identification, session)
+        style=style,
+        version=__version__,
+        scripts=script(environment, "to_copy.js", "explore.js", "replay.js"),
+        library=vendored("uplot", "uPlot.iife.min.js"),
+        library_style=vendored("uplot", "uPlot.min.css"),
+        **_chapters(identification, session),
     )
 
 
@@ -84,7 +92,12 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "blocks": ten,
         "principal": any(block.principal for block in ten),
         "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},
+        "poses": Markup(replay_json(session.rig, identification.total, identification.motions)),
+        "played": list(dict.fromkeys(motion.recording for motion in identification.motions)),
+        "drawing": (WIDTH, HEIGHT),
         "recordings": recordings,
+        "runs": list(dict.fromkeys(c.recording for c in channels if len(c.time) > 1)),
+        "samples": Markup(samples_json(channels)),
         "rms_rows": rms_table(channels, names),
         "whiteness": [(v, whiteness_views(channels, v.name)) for v in recordings if v.role != "at rest"],
         "findings": finding_views(identification.mismatch, len(faults)),
@@ -92,6 +105,7 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "shifts": shifts(identification),
         "determinations": determinations(identification, session),
         "sensors": sensors_used(session),
+        "copy": to_copy(identification, session),
         "doubts": doubt_groups(identification.parameters),
         "picture": Markup(picture_svg(scene)),
         "views": [(name, Markup(svg)) for name, svg in rig_svgs(scene)],

@@ -110,12 +110,54 @@ class Fields:
             raise self.fault(key, f"{value!r} is unknown; give {' or '.join(words)}{near}")
         return str(value)
 
+    def text(self, key: str, what: str, kind: str = "text") -> str:
+        """Text at ``key``; ``kind``: what a value that is none is said not to be."""
+        value = self.require(key, what)
+        if not isinstance(value, str):
+            raise self.fault(key, f"{value!r} is not a {kind}; give {what}")
+        return value
+
+    def names(self, key: str, what: str, *, at_least: int, few: str) -> list[str]:
+        """Names at ``key``, each once; ``few``: what is wrong with fewer than ``at_least``."""
+        names = self.require(key, what)
+        if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+            raise self.fault(key, f"{names!r} is not a list of names")
+        if len(names) < at_least:
+            raise self.fault(key, f"{len(names)} {few}")
+        for name in names:
+            if names.count(name) > 1:
+                raise self.fault(key, f"{name} is listed twice; list each once")
+        return names
+
+    def entries(self, key: str, what: str, form: str) -> list[Fields]:
+        """Mappings in the list at ``key``, one or more; ``form``: what one looks like."""
+        listed = self.require(key, what)
+        if not isinstance(listed, list) or not listed:
+            raise self.fault(key, f"is not {what.removeprefix('the ')}; give at least one {form}")
+        found = []
+        for index, item in enumerate(listed):
+            if not isinstance(item, dict):
+                raise self.fault(f"{key}[{index}]", f"{item!r} is not a mapping; give {form}")
+            found.append(self.below(self.key_path(f"{key}[{index}]"), item))
+        return found
+
+    def flag(self, key: str) -> bool:
+        """True or false at ``key``; false where it is missing."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise self.fault(key, f"{value!r} is unknown; give true or false")
+        return value
+
     def section(self, key: str, what: str) -> Fields:
         """Mapping at ``key``."""
         value = self.require(key, what)
         if not isinstance(value, dict):
             raise self.fault(key, f"{value!r} is not a mapping; give {what}")
-        return Fields(self.file, self.key_path(key), value)
+        return self.below(self.key_path(key), value)
+
+    def below(self, path: str, values: Mapping[str, object]) -> Fields:
+        """A mapping inside this one, at a key path from the top of the file."""
+        return Fields(self.file, path, values)
 
     def has(self, key: str) -> bool:
         """True where ``key`` carries a value."""

@@ -15,9 +15,7 @@ _YAML = (".yaml", ".yml")
 _TABLES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".ods", ".mat", ".npz", ".npy", ".parquet", ".h5")
 _KINDS = {"mcap": "mcap", "sqlite3": "sqlite3", "rosbag1": "ROS 1", "zstd": "compressed"}
 _WHAT = f"a session is a folder with a {FILE} that lists its bags"
-_CONVERT = (
-    "write its columns into a bag, as messages of the recording contract, and list that bag in a " + FILE
-)
+_CONVERT = "make a session of it with rig-identification import"
 
 
 def description_file(path: Path) -> Path:

@@ -46,6 +46,14 @@ def propose(folder: Path, namespace: str, read_run: ReadRun, progress: Callable[
     bags = bags_in(folder)
     rig_file, others = _rig_files(folder)
     rig = read_rig(rig_file) if rig_file else _stand_in(bags, namespace)
+    lines = [f"# A proposal: edit it and save it as {folder / FILE}", _rig_line(folder, rig_file, others)]
+    return "\n".join([*lines, *recordings_lines(folder, bags, rig, read_run, progress)]) + "\n"
+
+
+def recordings_lines(
+    folder: Path, bags: list[Path], rig: Rig, read_run: ReadRun, progress: Callable[[str], None] | None
+) -> list[str]:
+    """The list of recordings of a session.yaml in ``folder``, a line a bag."""
     judged = []
     for bag in bags:
         name = bag.relative_to(folder).as_posix()
@@ -55,9 +63,7 @@ def propose(folder: Path, namespace: str, read_run: ReadRun, progress: Callable[
     judged.sort(key=lambda one: (bool(one.refusal), one.start_ns))
     moving = [one for one in judged if one.motion is not None and not one.refusal]
     held_out = moving[-1] if len(moving) > 1 else None
-    lines = [f"# A proposal: edit it and save it as {folder / FILE}", _rig_line(folder, rig_file, others)]
-    lines += ["recordings:", *(_line(one, one is held_out) for one in judged)]
-    return "\n".join(lines) + "\n"
+    return ["recordings:", *(_line(one, one is held_out) for one in judged)]
 
 
 def _rig_files(folder: Path) -> tuple[Path | None, list[Path]]:

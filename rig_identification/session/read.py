@@ -17,7 +17,7 @@ from rig_identification.rig import Rig
 from rig_identification.session.bag import read_bag
 from rig_identification.session.channel import raw_channel
 from rig_identification.session.not_a_session import FILE
-from rig_identification.session.proposal import propose
+from rig_identification.session.proposal import ReadRun, propose
 from rig_identification.session.rig_description import read_rig
 from rig_identification.session.session_description import (
     BagEntry,
@@ -91,16 +91,21 @@ def _description(
     try:
         return read_session_description(path)
     except MissingDescription as err:
-
-        def as_run(bag: Path, rig: Rig) -> Recording:
-            expected = expected_topics(tuple(cable.name for cable in rig.cables), namespace, topics)
-            raw = _read_raw(BagEntry(bag.name, bag, "dynamic", False, None), expected)
-            return clean(RawSession("", rig, (raw,), namespace)).recordings[0]
-
         raise MissingDescription(
-            f"{err}; edit the proposal and save it as {path / FILE}",
-            propose(path, namespace, as_run, progress),
+            f"{err}; edit the proposal and save it as {path / FILE}, or let rig-identification init write it",
+            propose(path, namespace, read_run(namespace, topics), progress),
         ) from err
+
+
+def read_run(namespace: str, topics: Mapping[str, str] | None) -> ReadRun:
+    """What reads one bag as a dynamic run of a rig and cleans it."""
+
+    def read(bag: Path, rig: Rig) -> Recording:
+        expected = expected_topics(tuple(cable.name for cable in rig.cables), namespace, topics)
+        raw = _read_raw(BagEntry(bag.name, bag, "dynamic", False, None), expected)
+        return clean(RawSession("", rig, (raw,), namespace)).recordings[0]
+
+    return read
 
 
 def _read_raw(entry: BagEntry, expected: dict[str, Topic]) -> RawRecording:

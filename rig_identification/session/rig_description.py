@@ -121,14 +121,10 @@ def _underscores(root: Fields) -> str:
 
 
 def _cable_names(top: Fields) -> list[str]:
-    names = top.require("cables", "the list of the cables' names")
-    if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-        raise top.fault("cables", f"{names!r} is not a list of names")
-    if len(names) < 2:
-        raise top.fault("cables", f"{len(names)} cable(s); the body hangs on at least 2")
+    names = top.names(
+        "cables", "the list of the cables' names", at_least=2, few="cable(s); the body hangs on at least 2"
+    )
     for name in names:
-        if names.count(name) > 1:
-            raise top.fault("cables", f"{name} is listed twice; name each cable once")
         if name in DEVICES or name in _TOP_KEYS:
             raise top.fault("cables", f"{name} is the name of another part of the rig; rename the cable")
         if not top.has(name):

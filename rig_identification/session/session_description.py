@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig_identification.errors import InputError
 from rig_identification.recording import Dummy
 from rig_identification.session.fields import Fields, load_fields
 from rig_identification.session.not_a_session import check_description, description_file
@@ -44,42 +43,34 @@ def read_session_description(path: Path) -> SessionDescription:
     InputError
         The first fault, as one line with file, key path, value and what to do.
     """
-    file = description_file(path)
-    top = load_fields(file, "session description")
+    top = load_fields(description_file(path), "session description")
     check_description(top)
+    return session_from_fields(top)
+
+
+def session_from_fields(top: Fields) -> SessionDescription:
+    """Validate the content of a session.yaml, wherever it was read. Raises InputError."""
     top.refuse_misspelt(("rig", "recordings"))
-    rig = top.require("rig", "the rig description's path")
-    listed = top.require("recordings", "the list of bags")
-    if not isinstance(rig, str):
-        raise top.fault("rig", f"{rig!r} is not a path")
-    if not isinstance(listed, list) or not listed:
-        raise top.fault("recordings", "is not a list of bags; give at least one {bag: ..., kind: ...}")
-    entries = tuple(_entry(file, index, item) for index, item in enumerate(listed))
+    rig = top.text("rig", "the rig description's path", "path")
+    entries = tuple(map(_entry, top.entries("recordings", "a list of bags", "{bag: ..., kind: ...}")))
     _check_together(top, entries)
-    return SessionDescription(file, file.parent / rig, entries)
+    return SessionDescription(top.file, top.file.parent / rig, entries)
 
 
-def _entry(file: Path, index: int, item: object) -> BagEntry:
-    where = f"recordings[{index}]"
-    if not isinstance(item, dict):
-        raise InputError(f"{file}: {where}: {item!r} is not a mapping; give {{bag: ..., kind: ...}}")
-    fields = Fields(file, where, item)
+def _entry(fields: Fields) -> BagEntry:
     fields.refuse_unknown(_KEYS)
-    bag = fields.require("bag", "the bag's folder")
-    if not isinstance(bag, str):
-        raise fields.fault("bag", f"{bag!r} is not a path")
+    bag = fields.text("bag", "the bag's folder", "path")
     fields.require("kind", "static or dynamic")
     kind = fields.choice("kind", ("static", "dynamic"))
-    holdout = fields.values.get("holdout", False)
-    if not isinstance(holdout, bool):
-        raise fields.fault("holdout", f"{holdout!r} is unknown; give true or false")
+    holdout = fields.flag("holdout")
     if kind == "static" and holdout:
         raise fields.fault(
             "holdout", "a static recording cannot be held out; remove holdout or make it dynamic"
         )
     if kind == "dynamic" and fields.has("dummy"):
         raise fields.fault("dummy", "belongs to a static recording; remove it or make the recording static")
-    return BagEntry(bag, file.parent / bag, kind, holdout, _dummy(fields) if fields.has("dummy") else None)
+    folder = fields.file.parent / bag
+    return BagEntry(bag, folder, kind, holdout, _dummy(fields) if fields.has("dummy") else None)
 
 
 def _dummy(fields: Fields) -> Dummy:

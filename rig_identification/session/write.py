@@ -88,7 +88,7 @@ def write_session(
         for recording in session.recordings:
             if progress is not None:
                 progress(f"writing {recording.name}")
-            _write_bag(recording, fresh / recording.name, topics, storage, compression, receive_jitter, rng)
+            write_bag(recording, fresh / recording.name, topics, storage, compression, receive_jitter, rng)
         if folder.exists():
             os.replace(folder, aside / "replaced")
         os.replace(fresh, folder)
@@ -143,15 +143,17 @@ def _channels(recording: Recording, topics: dict[str, Topic]) -> Iterator[tuple[
             yield topic, series
 
 
-def _write_bag(
+def write_bag(
     recording: Recording,
     folder: Path,
     topics: dict[str, Topic],
-    storage: str,
-    compression: str,
-    receive_jitter: float,
-    rng: np.random.Generator,
+    storage: str = "mcap",
+    compression: str = "none",
+    receive_jitter: float = 0.0,
+    rng: np.random.Generator | None = None,
 ) -> None:
+    """Write one recording as a bag into a new folder; options as of :func:`write_session`."""
+    rng = rng or np.random.default_rng(0)
     plugin = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}[storage]
     writer = Writer(folder, version=_BAG_VERSION, storage_plugin=plugin)
     writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)

@@ -103,7 +103,21 @@ class TrackerModel:
         arm = self._arm_of(rows.reshape(-1, 3), stretch.reshape(-1))
         left = stretch - rows @ arm
         whole = float(np.sqrt(np.mean(moved**2) + np.mean(turn**2) * np.mean(hinges**2)))
-        return self._nats(left, np.full(unit.shape[0], whole)) + slanted(R)
+        blur = self._second_order(moved, turn, hinges, np.linalg.norm(span, axis=1))
+        return self._nats(left, np.full(unit.shape[0], whole), blur) + slanted(R)
+
+    @staticmethod
+    def _second_order(moved: Array, turn: Array, hinges: Array, length: Array) -> Array:
+        """(n,) m: what a cable keeps of its length in the second order, which rows of the first order lack.
+
+        A hinge that moves by s lies on a sphere, s^2/2L off its tangent; a turn by q brings a point at h
+        q^2 h/2 back. Less than this no pose is known to miss: a body on two parallel cables, whose motion
+        hardly stretches them in the first order, would be judged by it alone.
+        """
+        arm = np.linalg.norm(hinges, axis=1)
+        turned = np.mean(np.sum(turn**2, axis=1))
+        swing = np.mean(np.sum(moved**2, axis=1)) + turned * arm**2
+        return np.asarray(0.5 * (swing / length + turned * arm))
 
     def _arm_of(self, rows: Array, miss: Array) -> Array:
         span = max(float(np.ptp([c.body_point for c in self.rig.cables], axis=0).max()), 0.1)
@@ -112,13 +126,16 @@ class TrackerModel:
         normal = rows.T @ rows / std**2 + np.eye(3) / reach**2
         return np.asarray(np.linalg.solve(normal, rows.T @ miss / std**2))
 
-    def _nats(self, left: Array, spread: Array) -> float:
+    def _nats(self, left: Array, spread: Array, blur: Array | float = 0.0) -> float:
+        """Nats by which ``left`` is missed. blur: error of the model itself, beside what is left."""
         floor = np.repeat(FLOOR, [3, left.shape[1] - 3]) if left.shape[1] == 6 else FLOOR[0]
         noise = (self.rig.noise.get("mocap_position", 0.0), self.rig.noise.get("mocap_orientation", 0.0))
         floor = np.maximum(floor, np.repeat(noise, [3, 3]) if left.shape[1] == 6 else noise[0])
         whole = np.sqrt(np.mean(spread**2))
         std = np.sqrt(floor**2 + (ORDINARY * spread) ** 2 + (ACROSS * whole) ** 2)
-        return float(np.sum(nats(np.mean(left**2, axis=0) / std**2, std / np.maximum(spread, TINY))))
+        return float(
+            np.sum(nats((np.mean(left**2, axis=0) + blur**2) / std**2, std / np.maximum(spread, TINY)))
+        )
 
 
 def slanted(R: Array) -> float:

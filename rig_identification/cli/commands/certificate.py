@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,16 +67,14 @@ def document_of(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 def identified(arguments: argparse.Namespace) -> dict[str, Any]:
     """The result of a session, identified now."""
-    from rig_identification.identification import identify_prepared, prepare
-    from rig_identification.report import provenance, result_to_dict
-    from rig_identification.session.provenance import file_digests
+    from rig_identification.api import identify
+    from rig_identification.identification import prepare
 
     with StageProgress(sys.stderr) as progress:
-        raw = read_recorded(arguments.session, arguments.namespace, dict(arguments.topic), progress)
-        files = file_digests(arguments.session, watched(progress))
-        prepared = prepare(raw, watched(progress))
-        found = identify_prepared(prepared, progress)
-    return result_to_dict(found, provenance(prepared.session, files))
+        recorded = read_recorded(arguments.session, arguments.namespace, dict(arguments.topic), progress)
+        prepared = prepare(recorded.raw, watched(progress))
+        found = identify(prepared, progress=progress)
+    return replace(found, digests=recorded.digests).to_dict()
 
 
 def _write(certificate: Certificate, out: Path, *, pdf: bool) -> None:

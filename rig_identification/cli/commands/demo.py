@@ -10,7 +10,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig_identification.cli.commands.identify import REPORT, RESULT, identify_session
+from rig_identification.api.result import REPORT, RESULT
+from rig_identification.cli.commands.identify import identify_session
 from rig_identification.cli.output import check_output_folder
 from rig_identification.cli.simulated import write_simulated
 from rig_identification.errors import InputError

@@ -8,19 +8,23 @@ fitted it writes the best answer until then, marked as interrupted; the exit sta
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import TextIO
 
-from rig_identification.cli.output import check_output_folder, write_together
+from rig_identification.api.result import REPORT, RESULT, Result
+from rig_identification.cli.output import check_output_folder, written
 from rig_identification.cli.progress import StageProgress
 from rig_identification.cli.session_options import add_session_options, read_recorded, watched
+from rig_identification.cli.shown import add_shown_options, progress_stream, status_of
 from rig_identification.model.work import WORK
-from rig_identification.recording import Session
-from rig_identification.result import Identification, Interrupted
+from rig_identification.result import Identification
 
-RESULT, REPORT = "result.json", "report.html"
+VERDICTS = ("explained", "unexplained")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -35,13 +39,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="after so many units of work the search for what the ideal model leaves out begins nothing new; "
         f"default {WORK:g}, about two minutes of two cores",
     )
+    add_shown_options(parser, "the result", VERDICTS)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: argparse.Namespace) -> int:
     """Read, identify, write, and print the ten numbers."""
-    identify_session(
-        arguments.session, arguments.out, arguments.namespace, dict(arguments.topic), work=arguments.work
+    result = identify_session(
+        arguments.session,
+        arguments.out,
+        arguments.namespace,
+        dict(arguments.topic),
+        work=arguments.work,
+        show=_as_json if arguments.json else _nothing if arguments.quiet else None,
+        stream=progress_stream(arguments),
     )
+    return status_of(arguments, result.verdict)
 
 
 def units(text: str) -> float:
@@ -63,10 +75,13 @@ def identify_session(
     *,
     remark: Callable[[Identification], str] | None = None,
     work: float = WORK,
-) -> None:
+    show: Callable[[Result], None] | None = None,
+    stream: TextIO | None = None,
+) -> Result:
     """Identify the session at ``path`` into the folder ``out`` and print the ten numbers.
 
     remark: what else there is to say of the answer; printed before the report's name.
+    show: prints the answer in place of the ten numbers. stream: where progress goes; standard error.
 
     Raises
     ------
@@ -76,36 +91,35 @@ def identify_session(
         The user broke it off. Once the ideal model is fitted, the best answer until then is written and
         printed, marked as interrupted; before, the folder is as it was.
     """
-    from rig_identification.identification import identify_prepared, prepare
-    from rig_identification.session.provenance import file_digests
+    from rig_identification.api import Stopped, identify
+    from rig_identification.identification import prepare
 
     check_output_folder(out, (RESULT, REPORT))
-    with StageProgress(sys.stderr) as progress:
-        raw = read_recorded(path, namespace, topics or {}, progress)
-        files = file_digests(path, watched(progress))
-        prepared = prepare(raw, watched(progress))
+    with StageProgress(stream or sys.stderr) as progress:
+        recorded = read_recorded(path, namespace, topics or {}, progress)
+        prepared = prepare(recorded.raw, watched(progress))
         try:
-            identification = identify_prepared(prepared, progress, work)
-        except Interrupted as stopped:
-            identification = stopped.answer
+            result = identify(prepared, progress=progress, work=work)
+        except Stopped as stopped:
+            result = stopped.result
         progress("writing the report")
-        _write(identification, prepared.session, files, out)
-    _print(identification, out, remark)
-    if identification.interrupted:
+        result = replace(result, digests=recorded.digests)
+        written(result, out)
+    if show is None:
+        _print(result.identification, out, remark)
+    else:
+        show(result)
+    if result.identification.interrupted:
         raise KeyboardInterrupt("interrupted: result and report hold the best answer until then")
+    return result
 
 
-def _write(identification: Identification, session: Session, files: dict[str, str], out: Path) -> None:
-    from rig_identification.report import provenance, write_report, write_result
+def _as_json(result: Result) -> None:
+    print(json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False))
 
-    origin = provenance(session, files)
-    write_together(
-        out,
-        {
-            RESULT: lambda path: write_result(identification, path, origin),
-            REPORT: lambda path: write_report(identification, session, path),
-        },
-    )
+
+def _nothing(_: Result) -> None:
+    """Print nothing."""
 
 
 def _print(identification: Identification, out: Path, remark: Callable[[Identification], str] | None) -> None:

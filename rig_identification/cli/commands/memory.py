@@ -15,9 +15,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig_identification.cli.output import Writer, check_output_folder, write_together
+from rig_identification.cli.output import check_output_folder, write_together
 from rig_identification.cli.several_options import add_several_options, read_all, sessions_given
 from rig_identification.errors import InputError
+from rig_identification.files import Writer
 
 if TYPE_CHECKING:
     from rig_identification.several.memory import Memory, Moved
