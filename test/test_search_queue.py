@@ -129,7 +129,7 @@ def test_no_model_has_more_than_three_effects_and_no_more_than_four_are_expanded
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tree = {
-        "": [("a", 100.0, 1), ("b", 20.0, 1), ("c", 19.0, 1)],
+        "": [("a", 100.0, 1), ("b", 60.0, 1), ("c", 55.0, 1), ("d", 40.0, 1)],
         "a": [("a b", 200.0, 2)],
         "a b": [("a b c", 300.0, 3)],
     }
@@ -137,6 +137,13 @@ def test_no_model_has_more_than_three_effects_and_no_more_than_four_are_expanded
     assert expanded == ["", "a", "a b", "b"]
     assert found.told is None
     assert found.likeliest.label == "a, b, c"
+
+
+def test_what_gains_less_than_half_of_the_best_has_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    tree = {"": [("a", 100.0, 3), ("b", 40.0, 3)], "a": [], "b": [("b c", 300.0, ALONE)]}
+    found, expanded, _ = searched(monkeypatch, tree, ("b c",))
+    assert expanded == ["", "a"]
+    assert found.told is None
 
 
 def test_what_gains_no_more_than_chance_gives_is_no_child(monkeypatch: pytest.MonkeyPatch) -> None:
