@@ -17,6 +17,7 @@ from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.rolling import ways_of_rolling, with_body
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import needed_gain
@@ -75,11 +76,13 @@ def _ways_of(trial: Trial) -> list[NDArray[np.float64]]:
     return ways_of_rolling(problem, problem.runs, point.theta, point.starts[0])
 
 
-def _rolling_otherwise(trial: Trial, ways: list[NDArray[np.float64]]) -> Trial:
+def _rolling_otherwise(trial: Trial, ways: list[NDArray[np.float64]], budget: Budget) -> Trial:
     """The trial with its body rolling in one of several ways, where that is likelier."""
     problem, point = trial.problem, trial.evaluation.point
     best = trial
     for way in ways:
+        if budget.spent():
+            break
         theta = with_body(problem.bench.parameters, point.theta, way)
         starts = launch_states(problem.bench, problem.runs, theta, point.starts[0])
         start = replace(point, theta=theta, starts=starts)
@@ -104,11 +107,19 @@ def _weighed(raw: Problem, problem: Problem, evaluation: Evaluation) -> tuple[Pr
 
 
 def _better(
-    problem: Problem, evaluation: Evaluation, left: list[Candidate], count: int, notify: Callable[[str], None]
+    problem: Problem,
+    evaluation: Evaluation,
+    left: list[Candidate],
+    count: int,
+    notify: Callable[[str], None],
+    budget: Budget,
 ) -> list[Trial]:
-    """Trials that gain more than chance over ``count`` does, likeliest first."""
+    """Trials that gain more than chance over ``count`` does, likeliest first; past ``budget`` none begins."""
     base, tried = log_evidence(evaluation), []
-    for candidate in left:
+    for k, candidate in enumerate(left):
+        if budget.spent():
+            budget.leave(c.label for c in left[k:])
+            break
         notify(f"search: {candidate.label}")
         trial = _trial(problem, evaluation, candidate)
         if trial is not None and trial.evidence - base > needed_gain(candidate, count):
@@ -155,13 +166,18 @@ def _each_kind(tried: list[Trial], base: float) -> list[Trial]:
 
 
 def damped(
-    raw: Problem, base: Problem, evaluation: Evaluation, candidates: list[Candidate], notify: Notify
+    raw: Problem,
+    base: Problem,
+    evaluation: Evaluation,
+    candidates: list[Candidate],
+    notify: Notify,
+    budget: Budget,
 ) -> tuple[Choice, Problem, Evaluation] | None:
     """The effects that belong into the model together, and its fit to pieces; None: nothing damps.
 
     What damps most comes first, for no swing is followed without it, with the body rolling as suits it;
     then what changes the body's freedom, which is no matter of degree. Beside that all others are chosen
-    anew, until the choice stays.
+    anew, until the choice stays. Past the ``budget`` nothing new is begun.
     """
     dampers = [c for c in candidates if c.effect in DAMPERS]
     holds = [c for c in candidates if c.settle is not None]
@@ -170,24 +186,24 @@ def damped(
     def told(share: float) -> Callable[[str], None]:
         return lambda stage: notify(stage, share)
 
-    tried = _better(base, evaluation, dampers, count, told(0.2))
+    tried = _better(base, evaluation, dampers, count, told(0.2), budget)
     if not tried:
         return None
     notify("search: how it rolls", 0.3)
     # Fitted to a body that rolls as it does not, what stops a swing is bent to next to nothing
     # At which frequency it rolls does not depend on what damps it
-    ways = _ways_of(tried[0])
+    ways = [] if budget.spent() else _ways_of(tried[0])
     kinds = _each_kind(tried, log_evidence(evaluation))
-    first = max((_rolling_otherwise(trial, ways) for trial in kinds), key=lambda t: t.evidence)
-    held = _better(first.problem, first.evaluation, holds, count, told(0.35))
+    first = max((_rolling_otherwise(trial, ways, budget) for trial in kinds), key=lambda t: t.evidence)
+    held = _better(first.problem, first.evaluation, holds, count, told(0.35), budget)
     others = tuple(c for c in candidates if c not in holds)
     choice = Choice((first.candidate,), (), others, tuple(tried))
-    free = _settled(raw, base, first, choice, told(0.4))
+    free = _settled(raw, base, first, choice, told(0.4), budget)
     if not held:
         return free
     # What changes the body's freedom may have stood in for what was not in the model yet
     choice = replace(choice, holding=(held[0].candidate,))
-    bound = _settled(raw, base, held[0], choice, told(0.5))
+    bound = _settled(raw, base, held[0], choice, told(0.5), budget)
     fair = replace(free[1], runs=bound[1].runs)
     fitted, _ = solve(fair, free[2].point, iterations=STEPS, tolerance=0.5)
     # What follows the motion counts as one error, not as many small ones
@@ -196,12 +212,14 @@ def damped(
 
 
 def _settled(
-    raw: Problem, base: Problem, now: Trial, choice: Choice, notify: Callable[[str], None]
+    raw: Problem, base: Problem, now: Trial, choice: Choice, notify: Callable[[str], None], budget: Budget
 ) -> tuple[Choice, Problem, Evaluation]:
     """Effects chosen anew about each fit until the choice stays or returns. now: the fit of the first."""
     problem, evaluation = _weighed(raw, now.problem, now.evaluation)
     seen = {choice.labels}
     for _ in range(ROUNDS):
+        if budget.spent():
+            break
         notify("search: which effects together")
         again = _together(base, problem, evaluation, choice)
         if again.labels in seen:

@@ -21,6 +21,7 @@ from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
+from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hands import hand_finding, nobody_held
@@ -95,8 +96,8 @@ def _scored(ideal: Fitted, heavy: Problem, evaluation: Evaluation, converged: bo
     )
 
 
-def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
-    """Find what damps a watched body; None where nothing does."""
+def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watched | None:
+    """Find what damps a watched body; None where nothing does. budget: past which nothing new is begun."""
     ideal = found_ideal.fitted
     if found_ideal.careful is None:
         return None
@@ -113,7 +114,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify) -> Watched | None:
     mass = mass_of(parts, evaluation)
     candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
     candidates += physics_of_pendulums(rig, mass)
-    answer = damped(raw, parts, evaluation, candidates, notify)
+    answer = damped(raw, parts, evaluation, candidates, notify, budget)
     if answer is None or not answer[0].effects:
         return None
     choice, problem, parted = answer

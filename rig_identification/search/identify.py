@@ -123,10 +123,10 @@ def _without_unseen(found: Identification, rest: Identification, note: str) -> I
     return both_accounted(told, found)
 
 
-def _watched(ideal: Ideal, notify: Progress) -> Watched | None:
+def _watched(ideal: Ideal, notify: Progress, budget: Budget) -> Watched | None:
     """What damps a watched body; None where nothing does, or where no fit of it can be inverted."""
     try:
-        return explain_watched(ideal, notify)
+        return explain_watched(ideal, notify, budget)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 
@@ -188,7 +188,7 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
     plain, swinging = _plain(so_far), None
     if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
         ideal = so_far.ideal = with_pieces(ideal, searching)
-        watched = _watched(ideal, searching)
+        watched = _watched(ideal, searching, budget)
         if watched is not None:
             swinging = so_far.swinging = _answer_of(watched, session, plain)
             if not _worth_a_search(watched):
