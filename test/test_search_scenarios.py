@@ -252,7 +252,6 @@ QUICK = {
     "ceiling_and_imu_off_its_place",
     "hose_that_pulls",
     "inclinometer_and_cell",
-    "brake_and_no_liquid",
 }
 #: Those that do not come out, and what came instead.
 OTHERWISE: dict[str, str] = {}
