@@ -242,8 +242,8 @@ def assert_pushed(finding: Finding, recording: str, start: float, end: float) ->
     assert times["end"] > start
 
 
-#: Those that the gate runs: an effect of the model and a device, two devices, an event, an event beside an
-#: effect, what gives way, and a law.
+#: Those that the gate runs: an effect of the model and a device, two devices, an event beside an effect, and
+#: what gives way. A law stands in test_search_laws.py.
 QUICK = {
     "gyroscope_and_dry_hinges",
     "clock_and_inclinometer",
