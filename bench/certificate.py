@@ -20,15 +20,13 @@ import numpy as np
 
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.observability import inertial_estimate
-from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.sources import sources
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS
 from rig_identification.rig import DEFAULT_TOLERANCE
 from rig_identification.simulate import SampleRates, SessionSpec, Truth, case_spec, simulate_session
-from rig_identification.simulate.start import rest_state
+from rig_identification.simulate.at_truth import point_at_truth
 from rig_identification.thesis import load_case
 
 HERE = Path(__file__).parent
@@ -92,13 +90,7 @@ def at_truth(session: Session, truth: Truth) -> tuple[Problem, Point]:
     """The session's problem, and its unknowns as they truly are."""
     problem, _, _ = pose_problem(session)
     problem = replace(problem, bound=np.inf)
-    parameters = problem.bench.parameters
-    theta = parameters.start(truth.elements)
-    for i, p in enumerate(parameters.free):
-        theta[INERTIAL + i] = (truth.parameters[p.name] - p.nominal) / p.prior_std
-    rest = rest_state(model_at(parameters, theta))
-    starts = tuple(truth.starts[run.recording.name] for run in problem.runs)
-    return problem, Point(theta, starts, (rest,) * len(problem.rests))
+    return problem, point_at_truth(problem, truth)
 
 
 def estimate(session: Session, truth: Truth) -> np.ndarray:

@@ -12,23 +12,19 @@ goes on where the first stopped. A log entry of other source code is left out.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import rig_identification
+from bench.resumed import entries_of, fingerprint
 from rig_identification.estimate.identify import fit_ideal
 from rig_identification.estimate.observability import elements_covariance, inertial_estimate
-from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import model_at
-from rig_identification.estimate.solve import Point, Problem, evaluate
+from rig_identification.estimate.solve import Problem, evaluate
 from rig_identification.recording import Dummy
 from rig_identification.result import ELEMENTS
 from rig_identification.rig import Cable, Mount, Rig
@@ -43,7 +39,7 @@ from rig_identification.simulate import (
     case_spec,
     simulate_session,
 )
-from rig_identification.simulate.start import rest_state
+from rig_identification.simulate.at_truth import point_at_truth
 from rig_identification.simulate.thesis_case import NOISE
 from rig_identification.thesis import load_case
 
@@ -110,13 +106,7 @@ def three_cables() -> SessionSpec:
 
 def bound_at_truth(problem: Problem, truth: Truth) -> np.ndarray:
     """(10, 10) posterior covariance from the information matrix at the truth."""
-    parameters = problem.bench.parameters
-    theta = parameters.start(truth.elements)
-    for i, p in enumerate(parameters.free):
-        theta[INERTIAL + i] = (truth.parameters[p.name] - p.nominal) / p.prior_std
-    rest = rest_state(model_at(parameters, theta))
-    starts = tuple(truth.starts[run.recording.name] for run in problem.runs)
-    evaluation = evaluate(problem, Point(theta, starts, (rest,) * len(problem.rests)))
+    evaluation = evaluate(problem, point_at_truth(problem, truth))
     if evaluation is None:
         raise FloatingPointError("the forward model cannot be evaluated at the truth")
     return elements_covariance(problem, evaluation)
@@ -129,7 +119,7 @@ def one_session(geometry: str, number: int) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "geometry": geometry,
         "session": number,
-        "code": fingerprint(),
+        "code": fingerprint(Path(__file__)),
         "least_tension": min(truth.least_tension.values()),
         "truth": truth.elements.tolist(),
     }
@@ -147,17 +137,6 @@ def one_session(geometry: str, number: int) -> dict[str, Any]:
         "std": np.sqrt(np.diag(estimate.covariance)).tolist(),
         "bound": np.sqrt(np.diag(bound_at_truth(fitted.problem, truth))).tolist(),
     }
-
-
-def fingerprint() -> str:
-    """Of the sources that simulate and estimate: figures of two versions are not to be mixed."""
-    package = Path(rig_identification.__file__).parent
-    digest = hashlib.sha256()
-    for room in ("model", "estimate", "simulate"):
-        for file in sorted((package / room).rglob("*.py")):
-            digest.update(file.read_bytes())
-    digest.update(Path(__file__).read_bytes())
-    return digest.hexdigest()[:12]
 
 
 def score(entries: list[dict[str, Any]]) -> dict[str, Any]:
@@ -241,17 +220,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--out", type=Path, default=HERE, help="folder of monte_carlo.json and monte_carlo.md"
     )
     options = parser.parse_args(arguments)
-    entries = (
-        [json.loads(line) for line in options.log.read_text().splitlines()] if options.log.exists() else []
+    jobs = [(g, n) for n in range(options.sessions) for g in options.geometry]
+    entries = entries_of(
+        options.log,
+        fingerprint(Path(__file__)),
+        jobs,
+        lambda e: (e["geometry"], e["session"]),
+        one_session,
+        options.processes,
     )
-    entries = [e for e in entries if e["code"] == fingerprint()]
-    known = {(e["geometry"], e["session"]) for e in entries}
-    jobs = [(g, n) for n in range(options.sessions) for g in options.geometry if (g, n) not in known]
-    with options.log.open("a") as log, ProcessPoolExecutor(options.processes) as pool:
-        for future in as_completed([pool.submit(one_session, g, n) for g, n in jobs]):
-            entries.append(future.result())
-            log.write(json.dumps(entries[-1]) + "\n")
-            log.flush()
     scores = {}
     for geometry in GEOMETRIES:
         own = [e for e in entries if e["geometry"] == geometry]

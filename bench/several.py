@@ -12,10 +12,8 @@ log as they are done; a second call goes on where the first stopped.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,14 +21,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
-import rig_identification
 from bench.monte_carlo import three_cables
+from bench.resumed import entries_of, fingerprint
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.joint_information import joint_information
 from rig_identification.estimate.observability import inertial_estimate
-from rig_identification.estimate.parameters import INERTIAL, Parameter, parameter_set
-from rig_identification.estimate.prediction import model_at
-from rig_identification.estimate.solve import Point, solve
+from rig_identification.estimate.parameters import Parameter, parameter_set
+from rig_identification.estimate.solve import solve
 from rig_identification.model.body import elements_from_linear, linear_from_elements
 from rig_identification.model.motion import rig_model
 from rig_identification.recording import Session
@@ -41,7 +38,7 @@ from rig_identification.several.fuse import fuse
 from rig_identification.several.session_result import SessionResult
 from rig_identification.several.ties import STAYING, Sharing
 from rig_identification.simulate import SampleRates, SessionSpec, Truth, simulate_session
-from rig_identification.simulate.start import rest_state
+from rig_identification.simulate.at_truth import point_at_truth
 from rig_identification.simulate.true_rig import CUT, channels_of
 
 HERE = Path(__file__).parent
@@ -114,14 +111,8 @@ def one_pair(number: int) -> dict[str, Any]:
 
 def fitted(session: Session, truth: Truth) -> dict[str, Any]:
     """The fit of one session from the truth, as far as it is kept."""
-    problem, theta, _ = pose_problem(session)
-    parameters = problem.bench.parameters
-    theta = parameters.start(truth.elements)
-    for i, p in enumerate(parameters.free):
-        theta[INERTIAL + i] = (truth.parameters[p.name] - p.nominal) / p.prior_std
-    rest = rest_state(model_at(parameters, theta))
-    starts = tuple(truth.starts[run.recording.name] for run in problem.runs)
-    evaluation, converged = solve(problem, Point(theta, starts, (rest,) * len(problem.rests)))
+    problem, _, _ = pose_problem(session)
+    evaluation, converged = solve(problem, point_at_truth(problem, truth))
     estimate = inertial_estimate(problem, evaluation)
     return {
         "converged": bool(converged),
@@ -139,16 +130,6 @@ def result_of(name: str, entry: dict[str, Any]) -> SessionResult:
         np.array(entry["value"]), np.array(entry["covariance"]), tuple(entry["unobservable"])
     )
     return SessionResult(name, estimate, "none", (), joint_from_dict(entry["joint"]))
-
-
-def fingerprint() -> str:
-    """Of the sources that simulate and fit: figures of two versions are not to be mixed."""
-    package = Path(rig_identification.__file__).parent
-    digest = hashlib.sha256()
-    for room in ("model", "estimate", "simulate"):
-        for file in sorted((package / room).rglob("*.py")):
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
 
 
 def score(entries: list[dict[str, Any]]) -> dict[str, Any]:
@@ -271,15 +252,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--log", type=Path, default=HERE / "several.jsonl", help="one line a pair")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of several.json and several.md")
     options = parser.parse_args(arguments)
-    lines = options.log.read_text().splitlines() if options.log.exists() else []
-    entries = [e for e in map(json.loads, lines) if e["code"] == fingerprint()]
-    known = {e["pair"] for e in entries}
-    left = [n for n in range(options.pairs) if n not in known]
-    with options.log.open("a") as log, ProcessPoolExecutor(options.processes) as pool:
-        for future in as_completed([pool.submit(one_pair, n) for n in left]):
-            entries.append(future.result())
-            log.write(json.dumps(entries[-1]) + "\n")
-            log.flush()
+    jobs = [(n,) for n in range(options.pairs)]
+    entries = entries_of(
+        options.log, fingerprint(), jobs, lambda e: (e["pair"],), one_pair, options.processes
+    )
     scores = score(sorted(entries, key=lambda e: e["pair"])[: options.pairs])
     (options.out / "several.json").write_text(json.dumps(scores, indent=1) + "\n")
     (options.out / "several.md").write_text(as_markdown(scores))

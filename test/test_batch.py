@@ -141,7 +141,7 @@ def test_unchanged_files_are_not_read_again(sessions: Path, monkeypatch: pytest.
     def read(file: Path) -> str:
         raise AssertionError(f"{file} was read")
 
-    monkeypatch.setattr(fingerprints, "_digest", read)
+    monkeypatch.setattr(fingerprints, "sha256_of", read)
     assert seen_files(files, seen) == seen
 
 

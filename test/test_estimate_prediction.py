@@ -29,6 +29,7 @@ from rig_identification.simulate import (
     UnbalancedMass,
     simulate_session,
 )
+from rig_identification.simulate.at_truth import vector_at_truth
 
 Array = NDArray[np.float64]
 
@@ -75,22 +76,13 @@ def recorded(sample: Sample, seed: int = 0, **changes: object) -> tuple[Session,
     return simulate_session(specification(sample, **changes), np.random.default_rng(seed))  # type: ignore[arg-type]
 
 
-def vector_of(problem: Problem, truth: Truth) -> Array:
-    """The optimiser's vector at the truth."""
-    parameters = problem.bench.parameters
-    theta = parameters.start(truth.elements)
-    for i, p in enumerate(parameters.free):
-        theta[INERTIAL + i] = (truth.parameters[p.name] - p.nominal) / p.prior_std
-    return theta
-
-
 @pytest.fixture(scope="module")
 def short() -> tuple[Problem, Run, Array, State]:
     """A quarter of a second of a driven run, at the truth."""
     session, truth = recorded(random_sample(21, 3), duration=1.2)
     problem, _, _ = pose_problem(session)
     run = problem.runs[0].until(0.25)
-    return problem, run, vector_of(problem, truth), truth.starts["run_1"]
+    return problem, run, vector_at_truth(problem.bench.parameters, truth), truth.starts["run_1"]
 
 
 def plain(linearised: Linearised | None) -> Array:
@@ -134,7 +126,7 @@ def test_the_clock_of_the_exciter() -> None:
     session, truth = recorded(random_sample(21, 3), noise=False, duration=3.0)
     problem, _, _ = pose_problem(session)
     bench, run = problem.bench, replace(problem.runs[0], exciter_noise=0.0)
-    theta, start = vector_of(problem, truth), truth.starts["run_1"]
+    theta, start = vector_at_truth(problem.bench.parameters, truth), truth.starts["run_1"]
     column = INERTIAL + [p.name for p in bench.parameters.free].index("exciter.clock")
     e = np.eye(theta.size)[column]
     exact = linearise_run(bench, run, theta, start)
@@ -198,7 +190,10 @@ def test_at_the_truth_the_innovations_are_noise() -> None:
     session, truth = recorded(thesis_case_14(), seed=3)
     problem, _, _ = pose_problem(session)
     linearised = linearise_run(
-        problem.bench, problem.runs[0], vector_of(problem, truth), truth.starts["run_1"]
+        problem.bench,
+        problem.runs[0],
+        vector_at_truth(problem.bench.parameters, truth),
+        truth.starts["run_1"],
     )
     assert linearised is not None
     r = linearised.residual
@@ -211,7 +206,9 @@ def test_without_noise_the_truth_explains_every_sample() -> None:
     session, truth = recorded(thesis_case_14(), noise=False)
     problem, _, _ = pose_problem(session)
     run = replace(problem.runs[0], exciter_noise=0.0)
-    linearised = linearise_run(problem.bench, run, vector_of(problem, truth), truth.starts["run_1"])
+    linearised = linearise_run(
+        problem.bench, run, vector_at_truth(problem.bench.parameters, truth), truth.starts["run_1"]
+    )
     assert linearised is not None
     # In units of the described noise: nothing that a sensor could show. The force ends with the recording
     inner = linearised.nodes < run.grid.nodes - 20
@@ -225,7 +222,7 @@ def test_parameters_keep_gravity_and_the_body_possible() -> None:
     parameters = problem.bench.parameters
     rng = np.random.default_rng(0)
     for _ in range(20):
-        theta = vector_of(problem, truth) + rng.normal(size=parameters.size)
+        theta = vector_at_truth(problem.bench.parameters, truth) + rng.normal(size=parameters.size)
         physics = parameters.physics(theta)
         assert np.linalg.norm(physics[:3]) == pytest.approx(session.rig.gravity, rel=1e-12)
         assert can_exist(parameters.elements(theta))
@@ -242,7 +239,7 @@ def test_a_cut_run_is_the_same_run() -> None:
         assert part.time[-1] <= 1.0
         np.testing.assert_array_equal(part.values, whole.values[: part.values.shape[0]])
     problem, _, _ = pose_problem(session)
-    theta = vector_of(problem, truth)
+    theta = vector_at_truth(problem.bench.parameters, truth)
     one = linearise_run(problem.bench, run, theta, truth.starts["run_1"])
     other = linearise_run(problem.bench, cut, theta, truth.starts["run_1"])
     assert one is not None
@@ -255,7 +252,7 @@ def test_a_cut_run_is_the_same_run() -> None:
 def test_a_piece_moves_as_the_run_does_from_its_first_node_to_its_last() -> None:
     session, truth = recorded(random_sample(2, 3), duration=3.0)
     problem, _, _ = pose_problem(session)
-    run, theta = prepare(session.rig, session.training[0]), vector_of(problem, truth)
+    run, theta = prepare(session.rig, session.training[0]), vector_at_truth(problem.bench.parameters, truth)
     first, last = run.grid.nodes // 3, 2 * run.grid.nodes // 3
     whole = linearise_run(problem.bench, run, theta, truth.starts["run_1"])
     assert whole is not None

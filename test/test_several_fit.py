@@ -14,16 +14,14 @@ from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.joint_information import joint_information
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.origins import Origins, told
-from rig_identification.estimate.parameters import INERTIAL
-from rig_identification.estimate.prediction import model_at
-from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.solve import Evaluation, Problem, solve
 from rig_identification.recording import Session
 from rig_identification.report.joint_json import joint_to_dict
 from rig_identification.result import Identification, Mismatch
 from rig_identification.several.fuse import fuse
 from rig_identification.several.session_result import SessionResult
 from rig_identification.simulate import Truth, simulate_session
-from rig_identification.simulate.start import rest_state
+from rig_identification.simulate.at_truth import point_at_truth
 
 GIVEN = {"cable_1.length": 1.5, "imu.gyroscope_scale.x": -0.5}
 READING = 1100.4
@@ -41,13 +39,7 @@ def simulated() -> tuple[Session, Truth]:
 def fitted(simulated: tuple[Session, Truth]) -> tuple[Session, Problem, Evaluation]:
     session, truth = simulated
     problem, _, _ = pose_problem(session)
-    parameters = problem.bench.parameters
-    theta = parameters.start(truth.elements)
-    for i, p in enumerate(parameters.free):
-        theta[INERTIAL + i] = (truth.parameters[p.name] - p.nominal) / p.prior_std
-    rest = rest_state(model_at(parameters, theta))
-    starts = tuple(truth.starts[run.recording.name] for run in problem.runs)
-    evaluation, converged = solve(problem, Point(theta, starts, (rest,) * len(problem.rests)))
+    evaluation, converged = solve(problem, point_at_truth(problem, truth))
     assert converged
     return session, problem, evaluation
 

@@ -63,7 +63,7 @@ def identify(
     if isinstance(session, str | Path):
         session = read(session, namespace=namespace, topics=topics, progress=progress)
     prepared = _prepared(session, progress)
-    digests = _digests(session)
+    digests = _digests(session, progress)
     options = {} if work is None else {"work": work}
     try:
         answer = identify_prepared(prepared, progress, **options)
@@ -72,10 +72,14 @@ def identify(
     return Result(answer, prepared.session, digests)
 
 
-def _digests(session: Recorded | Check | Simulated | Session | Prepared) -> Mapping[str, str]:
+def _digests(
+    session: Recorded | Check | Simulated | Session | Prepared, progress: Progress | None
+) -> Mapping[str, str]:
     """SHA-256 of each file that a session was read from; none where it comes from memory."""
+    from rig_identification.session.provenance import file_digests
+
     recorded = session.recorded if isinstance(session, Check) else session
-    return recorded.digests if isinstance(recorded, Recorded) else {}
+    return file_digests(recorded.path, progress) if isinstance(recorded, Recorded) else {}
 
 
 def _prepared(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ class Recorded:
     """A session as it was recorded: nothing is left out or corrected yet."""
 
     raw: RawSession
-    digests: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of each file that was read
+    path: Path  # the session's folder, or its session.yaml
 
     @property
     def name(self) -> str:
@@ -136,10 +136,9 @@ def read(
         Something cannot be read. The message is one line: where, which value, what to do.
     """
     from rig_identification.session import read_raw
-    from rig_identification.session.provenance import file_digests
 
     raw = read_raw(Path(session), namespace=namespace, topics=topics, progress=progress)
-    return Recorded(raw, file_digests(Path(session), progress))
+    return Recorded(raw, Path(session))
 
 
 def _account(recording: str, channel: RawChannel) -> dict[str, Any]:

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rig_identification import __version__
 from rig_identification.errors import InputError
 from rig_identification.session.not_a_session import FILE
+from rig_identification.session.provenance import files_at, sha256_of
 from rig_identification.session.session_description import read_session_description
-
-#: Bytes that are read at once.
-BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ def files_of(folder: Path) -> tuple[Path, ...]:
         read = read_session_description(folder)
     except (InputError, OSError):
         return (description,)
-    bags = (file for entry in read.entries for file in _files_below(entry.folder))
+    bags = files_at(*(entry.folder for entry in read.entries))
     return tuple(dict.fromkeys((description, read.rig_file, *bags)))
 
 
@@ -49,7 +47,7 @@ def seen_files(files: tuple[Path, ...], before: Mapping[str, Seen]) -> dict[str,
             found = file.stat()
             last = before.get(str(file))
             if last is None or (last.size, last.changed_ns) != (found.st_size, found.st_mtime_ns):
-                last = Seen(found.st_size, found.st_mtime_ns, _digest(file))
+                last = Seen(found.st_size, found.st_mtime_ns, sha256_of(file))
         except OSError:
             continue  # what is missing is told by whoever reads the session
         out[str(file)] = last
@@ -65,18 +63,3 @@ def fingerprint(folder: Path, seen: Mapping[str, Seen], options: Mapping[str, ob
 
 def _below(path: Path, folder: Path) -> str:
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
-
-
-def _files_below(bag: Path) -> Iterator[Path]:
-    if bag.is_dir():
-        yield from sorted(file for file in bag.rglob("*") if file.is_file())
-    elif bag.is_file():
-        yield bag
-
-
-def _digest(file: Path) -> str:
-    found = hashlib.sha256()
-    with file.open("rb") as stream:
-        while block := stream.read(BLOCK):
-            found.update(block)
-    return found.hexdigest()

@@ -58,11 +58,12 @@ class Parameter:
     also: tuple[int, ...] = ()  # further entries that hold the same number
     ratio: bool = False  # positive: prior_std is that of its logarithm about the nominal's
     freed: bool = False  # a doubt of the ideal model that is believed no longer
+    unknown: bool = False  # of a mount that the description leaves out
 
     @property
     def described(self) -> bool:
         """Whether the description states it: how a tracker stands in the room has no tolerance to leave."""
-        return self.bounded and self.prior_std not in (UNKNOWN_POSITION, UNKNOWN_ROTATION)
+        return self.bounded and not self.unknown
 
     def value(self, position: float) -> float:
         """The number at ``position`` (units of the prior's std) of the optimiser's vector."""
@@ -213,8 +214,8 @@ class _Collector:
     def physics(self, name: str, unit: str, nominal: float, std: float, index: int) -> None:
         self._add(Parameter(name, unit, float(nominal), std, "physics", index))
 
-    def device(self, name: str, unit: str, std: float, index: int) -> None:
-        self._add(Parameter(name, unit, 0.0, std, "device", index))
+    def device(self, name: str, unit: str, std: float, index: int, *, unknown: bool = False) -> None:
+        self._add(Parameter(name, unit, 0.0, std, "device", index, unknown=unknown))
 
     def _add(self, parameter: Parameter) -> None:
         # What the lab is certain of is not free
@@ -287,14 +288,19 @@ def _sensor_parameters(c: _Collector, rig: Rig, places: DeviceLayout, channels: 
     if "mocap" in channels:
         known = rig.mocap is not None
         stds = (
-            ("marker_position", "m", tolerance["imu_position"] if known else UNKNOWN_POSITION),
-            ("marker_orientation", "rad", tolerance["imu_orientation"] if known else UNKNOWN_ROTATION),
-            ("tracker_position", "m", UNKNOWN_POSITION),
-            ("tracker_orientation", "rad", UNKNOWN_ROTATION),
+            ("marker_position", "m", tolerance["imu_position"] if known else UNKNOWN_POSITION, not known),
+            (
+                "marker_orientation",
+                "rad",
+                tolerance["imu_orientation"] if known else UNKNOWN_ROTATION,
+                not known,
+            ),
+            ("tracker_position", "m", UNKNOWN_POSITION, True),
+            ("tracker_orientation", "rad", UNKNOWN_ROTATION, True),
         )
-        for b, (name, unit, std) in enumerate(stds):
+        for b, (name, unit, std, unknown) in enumerate(stds):
             for a in range(3):
-                c.device(f"mocap.{name}.{AXES[a]}", unit, std, places.mocap + 3 * b + a)
+                c.device(f"mocap.{name}.{AXES[a]}", unit, std, places.mocap + 3 * b + a, unknown=unknown)
     keeps_time = next((n for n in (*places.cables, "imu", "mocap", "inclinometer") if n in channels), None)
     for name in ("imu", "inclinometer", "mocap"):
         entry = places.clock(name)

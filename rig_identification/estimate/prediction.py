@@ -312,7 +312,8 @@ def linearise_run(
         )
         tau = float(own[parameters.places.lag(channel.device)])
         settling = unsettled(run.grid.step, tau, channel.node, channel.grouped)
-        settled += settling_cost(channel.grouped_variance, settling)
+        if tau > 0.0:
+            settled += settling_cost(channel.grouped_variance, settling)
         spread = channel.grouped_variance + settling
         here = places[first : first + spread.size]
         first += spread.size

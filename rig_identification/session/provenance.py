@@ -36,15 +36,18 @@ def file_digests(path: Path, progress: Callable[[str], None] | None = None) -> d
     description = read_session_description(path)
     root = description.file.parent
     found = {}
-    for file in _files(description.file, description.rig_file, *(e.folder for e in description.entries)):
+    for file in files_at(description.file, description.rig_file, *(e.folder for e in description.entries)):
         name = file.relative_to(root).as_posix() if file.is_relative_to(root) else str(file)
         if progress is not None:
             progress(f"digest of {name}")
-        found[name] = _sha256(file)
+        try:
+            found[name] = sha256_of(file)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
     return found
 
 
-def _files(*paths: Path) -> Iterator[Path]:
+def files_at(*paths: Path) -> Iterator[Path]:
     """Each path itself, or of a folder every file in it by name."""
     for path in paths:
         if path.is_dir():
@@ -53,12 +56,10 @@ def _files(*paths: Path) -> Iterator[Path]:
             yield path
 
 
-def _sha256(file: Path) -> str:
+def sha256_of(file: Path) -> str:
+    """SHA-256 of a file's content, in hexadecimal. Raises OSError where it cannot be read."""
     digest = hashlib.sha256()
-    try:
-        with file.open("rb") as stream:
-            while piece := stream.read(PIECE):
-                digest.update(piece)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    with file.open("rb") as stream:
+        while piece := stream.read(PIECE):
+            digest.update(piece)
     return digest.hexdigest()

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import truncnorm
 
 from rig_identification.errors import InputError, did_you_mean
-from rig_identification.estimate.parameters import INERTIAL, UNKNOWN_ROTATION, ParameterSet, parameter_set
+from rig_identification.estimate.parameters import INERTIAL, ParameterSet, parameter_set
 from rig_identification.live.plant_effects import PlantEffects, with_effects
 from rig_identification.live.plant_switches import effects_of, switches
 from rig_identification.model import layout, sensors
@@ -78,8 +78,7 @@ def draw_true_rig(spec: SessionSpec, rng: np.random.Generator) -> TrueRig:
     if spec.doubts:
         drawn = truncnorm.rvs(-CUT, CUT, size=len(parameters.free), random_state=rng)
         # A mount that no one described is not a doubt: it stays where the simulation puts it
-        unknown = [p.name.startswith("mocap.") and p.prior_std >= UNKNOWN_ROTATION for p in parameters.free]
-        theta[INERTIAL:] = np.where(unknown, 0.0, drawn)
+        theta[INERTIAL:] = np.where([p.unknown for p in parameters.free], 0.0, drawn)
         theta[INERTIAL:] = [
             spec.given_doubts.get(p.name, at) for p, at in zip(parameters.free, theta[INERTIAL:], strict=True)
         ]

@@ -18,7 +18,6 @@ from rig_identification.check.readings.averages_undone import undone
 from rig_identification.check.readings.channel_model import (
     FALSE_ALARM,
     Array,
-    channels_of,
     groups,
     interval,
     noise_std,
@@ -31,8 +30,7 @@ from rig_identification.check.readings.telling import (
     listed,
     of_recordings,
     only,
-    together,
-    told,
+    told_of,
     where,
     without,
 )
@@ -63,11 +61,7 @@ _AVERAGED = ("tension", "exciter_force", "imu", "inclination", "mocap")
 
 def find(session: RawSession) -> tuple[Found, ...]:
     """Channels that were averaged; the readings before the average take their place."""
-    spotted = []
-    for (_, channel), recorded in channels_of(session):
-        if channel in _AVERAGED:
-            spotted += _spotted(recorded)
-    return told(session, together(spotted, tolerance=_SAME), _fault)
+    return told_of(session, _AVERAGED, _spotted, _fault, tolerance=_SAME)
 
 
 def _spotted(recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:

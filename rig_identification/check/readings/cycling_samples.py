@@ -22,7 +22,6 @@ from rig_identification.check.readings.channel_model import (
     FALSE_ALARM,
     Array,
     Indices,
-    channels_of,
     groups,
     interval,
 )
@@ -31,8 +30,7 @@ from rig_identification.check.readings.telling import (
     devices_of,
     listed,
     of_recordings,
-    together,
-    told,
+    told_of,
     where,
 )
 from rig_identification.examination import SetupFault
@@ -66,11 +64,7 @@ class _Cycle:
 
 def find(session: RawSession) -> tuple[Found, ...]:
     """Channels whose samples err in a cycle; means over whole cycles take their place."""
-    spotted = []
-    for (_, channel), recorded in channels_of(session):
-        if channel in _AVERAGED:
-            spotted += _spotted(recorded)
-    return told(session, together(spotted, tolerance=_SAME), _fault)
+    return told_of(session, _AVERAGED, _spotted, _fault, tolerance=_SAME)
 
 
 def _spotted(recorded: list[tuple[int, RawChannel]]) -> list[Spotted]:

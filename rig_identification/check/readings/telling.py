@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.check.found import Found
-from rig_identification.check.readings.channel_model import Flags, runs
+from rig_identification.check.readings.channel_model import Flags, channels_of, runs
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 
@@ -76,6 +76,24 @@ def told(
         session = corrected(session, group)
         found.append(Found(fault(session, group), session))
     return tuple(found)
+
+
+def told_of(
+    session: RawSession,
+    channels: Sequence[str],
+    spot: Callable[[list[tuple[int, RawChannel]]], list[Spotted]],
+    fault: Callable[[RawSession, list[Spotted]], SetupFault],
+    tolerance: float,
+) -> tuple[Found, ...]:
+    """The faults of one kind, looked for in each device's recordings of these ``channels``.
+
+    spot: what one device shows, from its index of recordings and channels. tolerance: see :func:`together`.
+    """
+    spotted: list[Spotted] = []
+    for (_, channel), recorded in channels_of(session):
+        if channel in channels:
+            spotted += spot(recorded)
+    return told(session, together(spotted, tolerance=tolerance), fault)
 
 
 def together(spotted: Sequence[Spotted], *, tolerance: float | None = None) -> list[list[Spotted]]:

@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig_identification.cli.commands.identify import answered
 from rig_identification.cli.output import check_output_folder, write_together
 from rig_identification.cli.progress import StageProgress
-from rig_identification.cli.session_options import add_session_options, read_recorded, watched
+from rig_identification.cli.session_options import add_session_options
 
 if TYPE_CHECKING:
     from rig_identification.report.certificate import Certificate
@@ -67,14 +67,9 @@ def document_of(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 def identified(arguments: argparse.Namespace) -> dict[str, Any]:
     """The result of a session, identified now."""
-    from rig_identification.api import identify
-    from rig_identification.identification import prepare
-
     with StageProgress(sys.stderr) as progress:
-        recorded = read_recorded(arguments.session, arguments.namespace, dict(arguments.topic), progress)
-        prepared = prepare(recorded.raw, watched(progress))
-        found = identify(prepared, progress=progress)
-    return replace(found, digests=recorded.digests).to_dict()
+        topics = dict(arguments.topic)
+        return answered(arguments.session, arguments.namespace, topics, progress).to_dict()
 
 
 def _write(certificate: Certificate, out: Path, *, pdf: bool) -> None:

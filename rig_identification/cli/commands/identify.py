@@ -91,19 +91,15 @@ def identify_session(
         The user broke it off. Once the ideal model is fitted, the best answer until then is written and
         printed, marked as interrupted; before, the folder is as it was.
     """
-    from rig_identification.api import Stopped, identify
-    from rig_identification.identification import prepare
+    from rig_identification.api import Stopped
 
     check_output_folder(out, (RESULT, REPORT))
     with StageProgress(stream or sys.stderr) as progress:
-        recorded = read_recorded(path, namespace, topics or {}, progress)
-        prepared = prepare(recorded.raw, watched(progress))
         try:
-            result = identify(prepared, progress=progress, work=work)
+            result = answered(path, namespace, topics or {}, progress, work)
         except Stopped as stopped:
             result = stopped.result
         progress("writing the report")
-        result = replace(result, digests=recorded.digests)
         written(result, out)
     if show is None:
         _print(result.identification, out, remark)
@@ -112,6 +108,31 @@ def identify_session(
     if result.identification.interrupted:
         raise KeyboardInterrupt("interrupted: result and report hold the best answer until then")
     return result
+
+
+def answered(
+    path: Path, namespace: str, topics: dict[str, str], progress: StageProgress, work: float = WORK
+) -> Result:
+    """What ``identify`` finds in the session at ``path``.
+
+    Raises
+    ------
+    InputError
+        The session cannot be used.
+    Stopped
+        The user broke the search off when there was an answer already; it is in ``result``.
+    """
+    from rig_identification.api import Stopped, identify
+    from rig_identification.identification import prepare
+    from rig_identification.session.provenance import file_digests
+
+    recorded = read_recorded(path, namespace, topics, progress)
+    digests = file_digests(path, watched(progress))
+    prepared = prepare(recorded.raw, watched(progress))
+    try:
+        return replace(identify(prepared, progress=progress, work=work), digests=digests)
+    except Stopped as stopped:
+        raise Stopped(replace(stopped.result, digests=digests)) from stopped
 
 
 def _as_json(result: Result) -> None:
