@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_estimate_prediction import recorded, specification, vector_of
+from test_estimate_prediction import recorded, specification
 from test_model_conservation import body_numbers, forces_on
 from test_model_rigs import bifilar, four_parallel, moving, random_sample, thesis_case_14
 
@@ -32,6 +32,7 @@ from rig_identification.model.motion import Input, simulate
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.simulate import Pulled, Truth, simulate_session
+from rig_identification.simulate.at_truth import vector_at_truth
 from rig_identification.simulate.start import rest_state
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def test_momentum_is_linear_in_the_inertial_parameters() -> None:
 def test_regression_recovers_the_body_from_a_noise_free_recording() -> None:
     session, truth = recorded(random_sample(5, 3), noise=False, doubts=False, duration=6.0)
     problem, _, _ = pose_problem(session)
-    bench, theta = problem.bench, vector_of(problem, truth)
+    bench, theta = problem.bench, vector_at_truth(problem.bench.parameters, truth)
     # Without noise the finest nodes tell
     run = prepare(session.rig, session.training[0], NODE_STEP)
     found = tracked(bench, run, theta, truth.starts["run_1"])
@@ -130,7 +131,7 @@ def test_fit_from_no_guess_holds_the_truth(cables: int) -> None:
 def at_the_truth(session: Session, truth: Truth) -> InertialEstimate:
     """What the recordings can tell, apart from how it is found."""
     problem, _, _ = pose_problem(session)
-    theta = vector_of(problem, truth)
+    theta = vector_at_truth(problem.bench.parameters, truth)
     rest = rest_state(model_at(problem.bench.parameters, theta))
     evaluation = evaluate(problem, Point(theta, (truth.starts["run_1"],), (rest,) * len(problem.rests)))
     assert evaluation is not None
@@ -171,7 +172,7 @@ def test_a_bifilar_pendulum_is_fitted_from_no_guess() -> None:
 def test_no_optimum_where_nothing_answers_any_more() -> None:
     session, truth = recorded(random_sample(33, 3), seed=5, duration=2.0)
     problem, _, _ = pose_problem(session)
-    rest = rest_state(model_at(problem.bench.parameters, vector_of(problem, truth)))
+    rest = rest_state(model_at(problem.bench.parameters, vector_at_truth(problem.bench.parameters, truth)))
 
     def plateau(scale: float) -> bool:
         elements = truth.elements.copy()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
-from test_estimate_prediction import recorded, vector_of
+from test_estimate_prediction import recorded
 from test_model_rigs import random_sample
 
 from rig_identification.estimate import solve as fitting
@@ -23,6 +23,7 @@ from rig_identification.estimate.solve import (
     evaluate,
     moved_by,
 )
+from rig_identification.simulate.at_truth import vector_at_truth
 
 #: Std of a doubt's prior that the tests let it lie off.
 BOUND = 0.4
@@ -33,7 +34,7 @@ def fit() -> tuple[Problem, Point]:
     """Two seconds of a session at a body 3 % too heavy, which no rig within these bounds makes up for."""
     session, truth = recorded(random_sample(3, 3), seed=4, duration=3.0)
     problem, _, _ = pose_problem(session)
-    theta = vector_of(problem, truth)
+    theta = vector_at_truth(problem.bench.parameters, truth)
     theta[INERTIAL:] = 0.0
     theta[:INERTIAL] = problem.bench.parameters.start(truth.elements * [1.03, *[1.0] * 9])[:INERTIAL]
     problem = replace(problem, runs=(problem.runs[0].until(2.0),), rests=(), bound=BOUND)
