@@ -57,11 +57,12 @@ def searched(
     explained: tuple[str, ...] = (),
     traced: tuple[str, ...] = (),
     budget: Budget = UNLIMITED,
+    beside: Tree | None = None,
 ) -> tuple[queue.Outcome, list[str], list[str]]:
     """What a search comes to where models have these children; what it expands, and what it asks whole runs.
 
     tree: of each model its children (names, log evidence, level). explained: models that explain all;
-    traced: those that leave a trace.
+    traced: those that leave a trace. beside: of each rival of a first effect itself with the second one.
     """
     expanded: list[str] = []
     whole: list[str] = []
@@ -78,7 +79,13 @@ def searched(
         wholly = name(standing) in explained
         return SimpleNamespace(wholly=wholly, told=wholly or name(standing) in traced, of=name(standing))
 
+    def crossed(
+        problem: object, standing: object, best: object, rivals: list[Standing], *_: object
+    ) -> list[Standing]:
+        return [_model(*both) for rival in rivals for both in (beside or {}).get(name(rival), [])]
+
     monkeypatch.setattr(queue, "children", children)
+    monkeypatch.setattr(queue, "crossed", crossed)
     monkeypatch.setattr(queue, "in_whole_runs", in_whole_runs)
     monkeypatch.setattr(queue, "stretch_of", lambda rung: rung)
     monkeypatch.setattr(queue, "problem_of", lambda ideal: None)
@@ -109,6 +116,16 @@ def test_another_first_effect_has_its_turn_where_the_likeliest_path_ends(
     assert expanded == ["", "a", "b"]
     assert found.told is not None
     assert found.told.of == "b c"  # type: ignore[attr-defined]
+
+
+def test_what_stood_first_is_asked_again_beside_what_came_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    tree = {"": [("a", 100.0, 3), ("b", 80.0, 3), ("d", 40.0, 3)], "a": [("a c", 300.0, ALONE)]}
+    beside = {"b": [("b c", 320.0, ALONE)], "d": [("d c", 500.0, ALONE)]}
+    found, expanded, whole = searched(monkeypatch, tree, ("a c", "b c"), beside=beside)
+    assert expanded == ["", "a"]
+    # "d" gained less than half of what the best first effect did and has no turn
+    assert whole == ["b c"]
+    assert found.told is not None
 
 
 def test_two_effects_that_leave_the_wrench_as_strong_as_it_was_are_a_path_s_end(
@@ -183,7 +200,7 @@ def begun_of(
         asked.append(effect)
         return _model(effect, gains[effect]) if effect in gains else None
 
-    monkeypatch.setattr(expand, "_begun", begun)
+    monkeypatch.setattr(expand, "begun_with", begun)
     first = expand._first_fits(_model("", 0.0), promises, budget, lambda label: None)
     assert [child.label for child in first] == [effect for effect in asked if effect in gains]
     return asked
@@ -249,7 +266,7 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     def begun(standing: Standing, promise: Promise, *_: object) -> Standing:
         return _model(promise.candidate.effect, promise.gain)
 
-    monkeypatch.setattr(expand, "_begun", begun)
+    monkeypatch.setattr(expand, "begun_with", begun)
     monkeypatch.setattr(expand, "_alike", lambda *_: [])
     monkeypatch.setattr(expand, "contradicted", lambda trial: trial.candidate.effect == "clock")
     monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, level))
@@ -257,9 +274,8 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(expand, "_giving_way", lambda *_: [])
     monkeypatch.setattr(expand, "_clocks_and_lags", lambda ranked: ranked)
     monkeypatch.setattr(expand, "_last_of", lambda child: SimpleNamespace(candidate=child.found[-1]))
-    monkeypatch.setattr(expand, "_makes_sense", lambda standing, ordinary: True)
-    monkeypatch.setattr(expand, "ordinary_errors", lambda problem: {})
-    monkeypatch.setattr(expand, "_earned", lambda before, after: after)
+    monkeypatch.setattr(expand, "makes_sense", lambda standing, ordinary: True)
+    monkeypatch.setattr(expand, "earned", lambda before, after: after)
     promises = [promise("clock", 100.0), promise("lag", 80.0)]
     candidates = [p.candidate for p in promises]
     found = expand.children(

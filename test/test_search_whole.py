@@ -20,7 +20,7 @@ from rig_identification.search.expand import Standing
 from rig_identification.search.ladder import Rung
 from rig_identification.search.levels import ALONE
 from rig_identification.search.search import problem_of
-from rig_identification.search.whole import _beside_rivals, _likeliest
+from rig_identification.search.whole import Model, _beside_rivals, _likeliest
 
 #: N m s/rad in every hinge; nats by which the wrong one is put ahead; error of the first cell's gain.
 DAMPING, AHEAD, TOO_MUCH = 1.0, 2.0, 0.02
@@ -57,7 +57,7 @@ def test_held_out_runs_put_damping_before_the_friction_that_chance_put_first(
     assert named.rivals[0]["log_likelihood_gap"] == pytest.approx(AHEAD)
     wrong = whole_runs(ideal, named)
     assert [f.effect for f in wrong.mismatch.findings] == ["hinge_friction"]
-    how, best = _likeliest(ideal, named, wrong, [friction, damping], lambda label: None)
+    how, best = _likeliest(ideal, named, wrong, [Model((), friction), Model((), damping)], lambda label: None)
     assert [f.effect for f in best.mismatch.findings] == ["hinge_damping"]
     assert [t.candidate.effect for t in how.found] == ["hinge_damping"]
     after, before = held_out_densities(best.fitted), held_out_densities(wrong.fitted)
@@ -76,7 +76,7 @@ def test_what_trails_by_far_is_not_asked_of_held_out_runs(ideal: Ideal, problem:
     named = _beside_rivals(Named(problem, (damping,), UNLIMITED), [far])
     alone = whole_runs(ideal, named)
     said: list[str] = []
-    how, best = _likeliest(ideal, named, alone, [damping, far], said.append)
+    how, best = _likeliest(ideal, named, alone, [Model((), damping), Model((), far)], said.append)
     assert best is alone
     assert how is named
     assert not said

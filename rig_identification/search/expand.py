@@ -123,8 +123,7 @@ def children(
             walked += _closer(problem, walked[-1], budget, say)
     if not any(w.rung.alone for w in walked):
         walked += _unbent(standing, left, promised_here, budget, say)
-    ordinary = ordinary_errors(problem)
-    sensible = (_earned(standing, s) for s in walked if _makes_sense(s, ordinary))
+    sensible = (earned(standing, s) for s in walked if makes_sense(s, problem))
     return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
 
 
@@ -179,7 +178,7 @@ def _clocks_and_lags(ranked: list[Standing]) -> list[Standing]:
     return out
 
 
-def _earned(before: Standing, after: Standing) -> Standing:
+def earned(before: Standing, after: Standing) -> Standing:
     """A model beside the one ``before``: where neither needs a wrench, what it gains from noise is none."""
     if not (before.rung.alone and after.rung.alone):
         return after
@@ -238,7 +237,7 @@ def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
     mass = mass_of(rung.problem, rung.evaluation)
     candidate = cable_elasticity(rig, model, mass)
     starts = [Promise(candidate, 0.0, {STIFFNESS: amount}) for amount in stiffnesses(rig, mass)]
-    found = [_begun(standing, start, budget, say) for start in starts if not budget.spent()]
+    found = [begun_with(standing, start, budget, say) for start in starts if not budget.spent()]
     return sorted((f for f in found if f is not None), key=lambda f: -f.rung.within_reach)[:1]
 
 
@@ -252,7 +251,7 @@ def _begun_best(standing: Standing, promise: Promise, budget: Budget, say: Say) 
     """The best first fit of a promise; from elsewhere too where it does not keep what it promised."""
     best: Standing | None = None
     for start in (promise, *promise.elsewhere):
-        child = _begun(standing, start, budget, say)
+        child = begun_with(standing, start, budget, say)
         if child is None:
             continue
         if best is None or child.rung.within_reach > best.rung.within_reach:
@@ -262,7 +261,7 @@ def _begun_best(standing: Standing, promise: Promise, budget: Budget, say: Say) 
     return best
 
 
-def _begun(standing: Standing, promise: Promise, budget: Budget, say: Say) -> Standing | None:
+def begun_with(standing: Standing, promise: Promise, budget: Budget, say: Say) -> Standing | None:
     """The first fit with one more effect, at the level of ``standing``; None where it cannot be followed."""
     rung, candidate = standing.rung, promise.candidate
     say(candidate.label)
@@ -289,7 +288,7 @@ def _alike(
     lag = lag_like(trial, left)
     asked = [Promise(c, 0.0, trial.values) for c in special_cases(trial.candidate, left)]
     asked += [] if lag is None else [lag]
-    alike = (_begun(standing, p, budget, say) for p in asked if p.candidate.label not in known)
+    alike = (begun_with(standing, p, budget, say) for p in asked if p.candidate.label not in known)
     return [child for child in alike if child is not None]
 
 
@@ -302,10 +301,13 @@ def special_cases(candidate: Candidate, others: list[Candidate]) -> list[Candida
     return [c for c in others if c.build is None and {p.name for p in c.parameters} < own]
 
 
-def _makes_sense(standing: Standing, ordinary: dict[str, float]) -> bool:
-    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary."""
+def makes_sense(standing: Standing, problem: Problem) -> bool:
+    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary.
+
+    problem: without any effect.
+    """
     trial = _last_of(standing)
-    return possible(trial) and beyond_doubt(trial, ordinary, ORDINARY)
+    return possible(trial) and beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
 
 
 def _last_of(standing: Standing) -> Trial:

@@ -18,6 +18,7 @@ from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
+from rig_identification.search.crossed import crossed, siblings
 from rig_identification.search.expand import MEANT, Standing, children
 from rig_identification.search.ladder import REACHED, Rung, begun, climbed
 from rig_identification.search.levels import ALONE
@@ -110,6 +111,10 @@ def search(
         every = [child for child in every if child.evidence > standing.evidence + MEANT]
         if not every:
             continue
+        if every[0].rung.level >= NEARLY_ALONE:
+            rivals = siblings(standing, queue)
+            every += crossed(looked_at, standing, every[0], rivals, budget, say)
+            every.sort(key=lambda child: -child.evidence)
         best = every[0]
         if best.evidence > likeliest.evidence:
             likeliest, partly = best, None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,28 @@ MOST_EFFECTS = 3
 CLOSE = 30.0
 
 
+class Model(NamedTuple):
+    """Effects of a model as fits without a discrepancy have them."""
+
+    earlier: tuple[Trial, ...]
+    last: Trial  # in which it differs from what it is compared with
+
+    @property
+    def evidence(self) -> float:
+        """Log evidence with all of them."""
+        return self.last.evidence
+
+    @property
+    def numbers(self) -> int:
+        """How many its effects have together."""
+        return sum(len(t.candidate.parameters) for t in (*self.earlier, self.last))
+
+    @property
+    def label(self) -> str:
+        """Names of its effects."""
+        return ", ".join(t.candidate.label for t in (*self.earlier, self.last))
+
+
 def in_whole_runs(
     ideal: Ideal,
     problem: Problem,
@@ -50,19 +73,21 @@ def in_whole_runs(
 ) -> Explained | None:
     """Whole runs with the effects of ``standing``; None where they cannot be fitted.
 
-    problem: without any effect. others: with another last effect, likeliest first: of those that hardly
-    trail it the one that the held-out runs say most for is told.
+    problem: without any effect. others: further models, likeliest first: of those that differ in one effect
+    and hardly trail it the one that the held-out runs say most for is told.
     """
-    found = [standing.trial(c) for c in standing.found]
-    alike = [o.trial(o.found[-1]) for o in others if _comparable(o, standing)]
-    ranked = [found[-1], *alike]
-    earlier = tuple(found[:-1])
+    ranked = [_model(standing, standing.found[-1])]
+    for other in others:
+        differs = _in_one(other, standing)
+        if differs is not None:
+            ranked.append(_model(other, differs))
     say("whole runs with " + standing.label)
     try:
-        named = _beside_rivals(Named(problem, (*earlier, ranked[0]), budget, heard=heard), ranked[1:])
+        named = Named(problem, (*ranked[0].earlier, ranked[0].last), budget, heard=heard)
+        named = _beside_rivals(named, [model.last for model in ranked[1:]])
         best = whole_runs(ideal, named)
         named, best = _made_sparse(ideal, named, best)
-        ranked[0] = named.found[-1]
+        ranked[0] = Model(named.found[:-1], named.found[-1])
         if not best.wholly:
             named, best, ranked = _next_likely(ideal, named, best, ranked, say)
         if best.wholly:
@@ -86,10 +111,17 @@ def _made_sparse(ideal: Ideal, named: Named, best: Explained) -> tuple[Named, Ex
     return (its, again) if again.told or not best.told else (named, best)
 
 
-def _comparable(other: Standing, standing: Standing) -> bool:
-    """Whether a model has another last effect beside the same others, and needs no stronger wrench."""
-    same = other.found[:-1] == standing.found[:-1]
-    return same and other.rung.level >= standing.rung.level and other.found[-1] != standing.found[-1]
+def _model(standing: Standing, differs: Candidate) -> Model:
+    """A model as whole runs begin with it."""
+    earlier = tuple(standing.trial(c) for c in standing.found if c is not differs)
+    return Model(earlier, standing.trial(differs))
+
+
+def _in_one(other: Standing, standing: Standing) -> Candidate | None:
+    """The effect in which a model differs from ``standing``; None: in more, or it needs a stronger wrench."""
+    differs = [c for c in other.found if c not in standing.found]
+    alike = len(other.found) == len(standing.found) and len(differs) == 1
+    return differs[0] if alike and other.rung.level >= standing.rung.level else None
 
 
 def _beside_rivals(named: Named, others: list[Trial]) -> Named:
@@ -104,18 +136,18 @@ def _beside_rivals(named: Named, others: list[Trial]) -> Named:
 
 
 def _next_likely(
-    ideal: Ideal, named: Named, best: Explained, ranked: list[Trial], say: Say
-) -> tuple[Named, Explained, list[Trial]]:
+    ideal: Ideal, named: Named, best: Explained, ranked: list[Model], say: Say
+) -> tuple[Named, Explained, list[Model]]:
     """The likeliest of the close rivals that explains all, where the first of them does not.
 
     best: whole runs with the first. Returns what is given where none does.
     """
-    earlier = named.found[:-1]
-    for k, trial in enumerate(ranked[1:], start=1):
-        if named.budget.spent() or ranked[0].evidence - trial.evidence > CLOSE:
+    for k, model in enumerate(ranked[1:], start=1):
+        if named.budget.spent() or ranked[0].evidence - model.evidence > CLOSE:
             break
-        its = _beside_rivals(replace(named, found=(*earlier, trial)), ranked[k + 1 :])
-        say("whole runs with " + trial.candidate.label)
+        its = replace(named, found=(*model.earlier, model.last))
+        its = _beside_rivals(its, [other.last for other in ranked[k + 1 :]])
+        say("whole runs with " + model.label)
         found = whole_runs(ideal, its)
         if found.wholly:
             return its, found, ranked[k:]
@@ -123,41 +155,42 @@ def _next_likely(
 
 
 def _likeliest(
-    ideal: Ideal, named: Named, best: Explained, ranked: list[Trial], say: Say
+    ideal: Ideal, named: Named, best: Explained, ranked: list[Model], say: Say
 ) -> tuple[Named, Explained]:
-    """What all runs say most for, held-out ones among them, of last effects ``ranked`` by the fitted ones.
+    """What all runs say most for, held-out ones among them, of models ``ranked`` by the fitted ones.
 
     best: whole runs with the first of them, which leave only noise. One with more numbers of its own bends
     to what is left, and is not asked.
     """
-    first, earlier = ranked[0], named.found[:-1]
+    first = ranked[0]
     heard = [(first, named, best)]
-    for trial in ranked[1:]:
-        plain = len(trial.candidate.parameters) <= len(first.candidate.parameters)
-        if named.budget.spent() or first.evidence - trial.evidence > CLOSE or not plain:
+    for model in ranked[1:]:
+        plain = model.numbers <= first.numbers
+        if named.budget.spent() or first.evidence - model.evidence > CLOSE or not plain:
             continue
-        its = replace(named, found=(*earlier, trial))
-        say("whole runs with " + trial.candidate.label)
-        heard.append((trial, its, whole_runs(ideal, its)))
+        its = replace(named, found=(*model.earlier, model.last))
+        say("whole runs with " + model.label)
+        heard.append((model, its, whole_runs(ideal, its)))
     if len(heard) == 1:
         return named, best
     held = [held_out_densities(found.fitted) for _, _, found in heard]
     # A run that one of them cannot follow tells nothing of the others
     followed = set.intersection(*(set(densities) for densities in held))
     said = [
-        _over_all(t, found) + sum(densities[key] for key in followed)
-        for (t, _, found), densities in zip(heard, held, strict=True)
+        _over_all(model.last, found) + sum(densities[key] for key in followed)
+        for (model, _, found), densities in zip(heard, held, strict=True)
     ]
     chosen = max((k for k, h in enumerate(heard) if h[2].wholly), key=lambda k: said[k])
-    last, its, found = heard[chosen]
+    (earlier, last), its, found = heard[chosen]
     fitted = {
-        id(t): replace(as_fitted(explained.fitted, t), evidence=all_runs)
-        for (t, _, explained), all_runs in zip(heard, said, strict=True)
+        id(model.last): replace(as_fitted(explained.fitted, model.last), evidence=all_runs)
+        for (model, _, explained), all_runs in zip(heard, said, strict=True)
     }
-    trailing = [fitted[id(t)] for t in ranked if id(t) in fitted and t is not last]
+    every = [model.last for model in ranked]
+    trailing = [fitted[id(t)] for t in every if id(t) in fitted and t is not last]
     # Of those that were not asked what the fitted runs say stays
     behind = said[chosen] - last.evidence
-    trailing += [replace(t, evidence=t.evidence + behind) for t in ranked if id(t) not in fitted]
+    trailing += [replace(t, evidence=t.evidence + behind) for t in every if id(t) not in fitted]
     its = _beside_rivals(replace(its, found=(*earlier, replace(last, evidence=said[chosen]))), trailing)
     told = replace(found.mismatch, alternatives=its.rivals)
     return its, replace(found, mismatch=told, bodies=its.bodies)
