@@ -198,6 +198,39 @@ def test_bursts_of_a_quick_device_are_undone(wait: float) -> None:
     assert np.abs(late).max() < wait
 
 
+def measured_at(one: RawChannel, stamps: Stamps) -> NDArray[np.float64]:
+    """(n, width) what a device would have measured at other times, ns."""
+    return np.asarray(CubicSpline(one.stamp_ns - one.stamp_ns[0], one.values)(stamps - one.stamp_ns[0]))
+
+
+@pytest.mark.parametrize("most", [0.0002, 0.001])
+def test_values_tell_stamps_that_jitter_from_a_device_that_measures_unevenly(most: float) -> None:
+    """A host stamps early or late, and some samples are lost; or the device measures when it is stamped."""
+    rng = np.random.default_rng(5)
+
+    def jittering(stamps: Stamps) -> Stamps:
+        return stamps + np.round(rng.uniform(-most, most, len(stamps)) * SECOND).astype(np.int64)
+
+    even, uneven, true = [], [], []
+    for recording in session().recordings:
+        old = next(c for c in recording.channels if c.topic == IMU)
+        kept = rng.random(len(old.stamp_ns)) > 0.02
+        stamps = jittering(old.stamp_ns)
+        lost = replace(old, stamp_ns=stamps[kept], received_ns=old.received_ns[kept], values=old.values[kept])
+        right = replace(lost, values=measured_at(old, stamps)[kept])
+        true.append(recording.with_channels(replace(lost, stamp_ns=old.stamp_ns[kept])))
+        even.append(recording.with_channels(lost))
+        uneven.append(recording.with_channels(right))
+    raw = session()
+    corrected, (fault,) = examined(replace(raw, recordings=tuple(even)))
+    assert (fault.where["kind"], fault.where["channel"]) == ("jitter", "imu")
+    assert fault.parameters["jitter"]["value"] == pytest.approx(most / 3.0**0.5, rel=0.1)
+    assert fault.parameters["lost"]["value"] == pytest.approx(0.02, rel=0.5)
+    off = errors(replace(raw, recordings=tuple(true)), corrected)
+    assert np.std(off) < 0.1 * most
+    assert examined(replace(raw, recordings=tuple(uneven)))[1] == []
+
+
 @pytest.mark.parametrize("poll", [0.008, 0.013, 0.032])
 def test_values_tell_a_polled_device_from_one_that_measures_at_ticks(poll: float) -> None:
     """Both have the same stamps; what is measured at even times is off the motion at those of the polls."""
@@ -214,8 +247,9 @@ def test_values_tell_a_polled_device_from_one_that_measures_at_ticks(poll: float
     for recording in raw.recordings:
         old = next(c for c in recording.channels if c.topic == topic)
         stamps = polled(old.stamp_ns)
-        values = CubicSpline(old.stamp_ns - old.stamp_ns[0], old.values)(stamps - old.stamp_ns[0])
-        recordings.append(recording.with_channels(replace(old, stamp_ns=stamps, values=values)))
+        recordings.append(
+            recording.with_channels(replace(old, stamp_ns=stamps, values=measured_at(old, stamps)))
+        )
     assert examined(replace(raw, recordings=tuple(recordings)))[1] == []
 
 
@@ -345,6 +379,8 @@ def _as_devices_do(
     stamps = one.stamp_ns + np.round((off * jitter * interval) * SECOND).astype(np.int64)
     stamps += np.round(rate * (stamps - stamps[0])).astype(np.int64)
     stamps = stamps // rounding * rounding
+    # It measures when it stamps, as unevenly as it does
+    one = replace(one, values=measured_at(one, stamps))
     received = one.received_ns
     if receipt != "real":
         received = stamps + 2_000_000 if receipt == "copied" else START + (stamps - START) // 20

@@ -28,6 +28,7 @@ LEAP = 37  # s, TAI less UTC
 STEPS = (0.05, 0.5, 30.0)  # s
 DRIFTS = (100.0, 300.0, 1000.0)  # ppm
 JITTERS = (0.002, 0.006, 0.02)  # s, mean delay beyond the least
+UNEVEN = (0.0005, 0.001, 0.002)  # s, std of stamps to either side
 BURSTS = (0.008, 0.016, 0.064)  # s between hand-overs
 
 
@@ -162,6 +163,9 @@ def _arrivals(place: str, names: tuple[str, ...]) -> Iterator[Case]:
     for jitter in JITTERS:
         variant = f"{1000 * jitter:g}_ms"
         yield stamp_case("arrival_time", place, variant, names, on(names, _arrived(jitter)))
+    for spread in UNEVEN:
+        variant = f"{1000 * spread:g}_ms"
+        yield stamp_case("jitter", place, variant, names, on(names, _uneven(spread)), jitter=spread)
     for interval in BURSTS:
         variant = f"{1000 * interval:g}_ms"
         # What is slower than the bursts comes one by one: that is arrival time
@@ -170,6 +174,16 @@ def _arrivals(place: str, names: tuple[str, ...]) -> Iterator[Case]:
 
 HANDED_ON = 200_000  # ns from the stamp to the recorder
 LEAST_DELAY = 0.002  # s
+
+
+def _uneven(spread: float) -> StampLaw:
+    """Stamped early as often as late, in order."""
+
+    def change(channel: RawChannel, rng: np.random.Generator) -> RawChannel:
+        off = np.round(rng.normal(0.0, spread, len(channel.stamp_ns)) * SECOND).astype(np.int64)
+        return replace(channel, stamp_ns=np.sort(channel.stamp_ns + off))
+
+    return change
 
 
 def _arrived(jitter: float) -> StampLaw:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.check.stamps.polling import lattice, measured_evenly
+from rig_identification.check.stamps.evenly import measured_evenly
+from rig_identification.check.stamps.polling import lattice
 from rig_identification.check.stamps.regular import (
     TOGETHER,
     Grid,

@@ -1,8 +1,7 @@
 """A driver that polls a slow device: stamps lie on the lattice of its polls, values on that of the device.
 
 Stamps alone do not tell a device that is polled from one that measures unevenly, as at every second or third
-tick of a quicker clock. The values do: each lies off a smooth motion by its velocity times its time's error.
-Where a body hardly moves they tell nothing, and the stamps do no harm.
+tick of a quicker clock. The values do (evenly.py).
 """
 
 from __future__ import annotations
@@ -20,12 +19,6 @@ _OWN = 4.0
 _FINE, _WITHIN = 8, 2
 #: A line as strong as the strongest: sinc(1/4)^2 is 0.8, what half of a bin beside it leaves.
 _STRONG, _MULTIPLES = 0.8, 8
-#: Fourth differences of white noise: sqrt(1 + 16 + 36 + 16 + 1).
-_GAIN_4 = 70.0**0.5
-#: Velocities are known to a tenth where their variance is this many times that of their noise.
-_KNOWN = 10.0
-#: The velocities' own errors and the grid's: the coefficient is no better than this.
-_COEFFICIENT = 0.1
 
 
 def lattice(times: Array, interval: float, least: float) -> tuple[float, float]:
@@ -53,29 +46,3 @@ def lattice(times: Array, interval: float, least: float) -> tuple[float, float]:
             break
     # Of stamps at random the power is exponential with mean 1
     return 1.0 / float(frequency[max(best, 1)]), float(power[best]) - math.log(np.count_nonzero(sought) + 1)
-
-
-def measured_evenly(values: Array, late: Array, interval: float) -> float:
-    """Nats for values of even times against values of the stamps' times.
-
-    values: (n, width), each sample ``interval`` (s) after the one before; late: (n,) s, stamp less even time.
-    """
-    evidence = 0.0
-    for column in values[:, np.isfinite(values).all(axis=0)].T:
-        velocity = np.gradient(column, interval)
-        bends = np.diff(column, 4)
-        noise = float(np.median(np.abs(bends))) / 0.6745 / _GAIN_4 / (math.sqrt(2.0) * interval)
-        if not np.var(velocity) > _KNOWN * max(noise**2, 1e-300):
-            continue
-        due = np.diff(velocity * (late - np.mean(late)), 4)
-        square = float(due @ due)
-        if square > 0.0:
-            part = float(due @ bends) / square
-            error = (bends - part * due) * due
-            # Differences share noise over four samples
-            variance = sum(
-                float(error[h:] @ error[: len(error) - h]) * (1 if h == 0 else 2) for h in range(5)
-            )
-            std = math.hypot(math.sqrt(max(variance, float(error @ error))) / square, _COEFFICIENT)
-            evidence += 0.5 * ((1.0 - part) ** 2 - part**2) / std**2
-    return evidence

@@ -204,3 +204,20 @@ def rate_line(times: Array, usual: float | None = None) -> tuple[float, float]:
         line = [abs(np.mean(np.exp(2j * np.pi * f * times))) for f in trial]
         middle, resolution = float(trial[int(np.argmax(line))]), resolution / 4.0
     return 1.0 / middle, float(max(line))
+
+
+def evenly_spaced(times: Array) -> Grid | None:
+    """The regular grid amid stamps that are early as often as late; None where samples cannot be counted.
+
+    times (n,): s, in the order of measurement. A sample keeps its number while its stamp is off by less than
+    half an interval; what is lost shows as a number left out.
+    """
+    interval, agreement = rate_line(times)
+    if agreement == 0.0:
+        return None
+    phase = np.angle(np.mean(np.exp(2j * np.pi * times / interval))) / (2.0 * np.pi)
+    index = np.round(times / interval - phase).astype(np.int64)
+    if np.any(np.diff(index) < 1):
+        return None
+    slope, start = np.polynomial.Polynomial.fit(index, times, 1).convert().coef[::-1]
+    return Grid(float(start), float(slope), index, times - start - slope * index)
