@@ -242,12 +242,10 @@ def assert_pushed(finding: Finding, recording: str, start: float, end: float) ->
     assert times["end"] > start
 
 
-#: Those that the gate runs: an effect of the model and a device, two devices, an event beside an effect, and
-#: what gives way. A law stands in test_search_laws.py.
+#: Those that the gate runs: two devices, one number of the rig, a ceiling beside a device, and a hose. A law
+#: stands in test_search_laws.py, an event in test_mismatch_pulse.py.
 QUICK = {
-    "gyroscope_and_dry_hinges",
     "clock_and_inclinometer",
-    "rotor_and_push",
     "cable_too_long",
     "ceiling_and_imu_off_its_place",
     "hose_that_pulls",
