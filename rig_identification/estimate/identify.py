@@ -250,9 +250,19 @@ def only_watched(problem: Problem) -> bool:
     return bool(problem.runs) and not measured & FORCES
 
 
+def weighed(problem: Problem) -> bool:
+    """Whether a force is measured that momentum can be balanced with."""
+    measured = {c.quantity for run in problem.runs for c in run.channels}
+    return not problem.runs or bool(measured & {"tension", "exciter_force"})
+
+
 def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
-    """The way to a first guess that the session's sensors allow."""
-    if only_watched(problem):
+    """The way to a first guess that the session's sensors allow.
+
+    Without a force an accelerometer says no more of inertia than a tracker does, and how the body hangs says
+    next to nothing of its centre of mass where cables are nearly parallel.
+    """
+    if not weighed(problem):
         watched = _watched_start(problem, held, progress)
         if watched is not None:
             return watched

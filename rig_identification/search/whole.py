@@ -140,11 +140,14 @@ def _next_likely(
 ) -> tuple[Named, Explained, list[Model]]:
     """The likeliest of the close rivals that explains all, where the first of them does not.
 
-    best: whole runs with the first. Returns what is given where none does.
+    best: whole runs with the first. Returns what is given where none does. Where the first one leaves but a
+    trace, one with more numbers of its own is not asked: it bends to that.
     """
     for k, model in enumerate(ranked[1:], start=1):
         if named.budget.spent() or ranked[0].evidence - model.evidence > CLOSE:
             break
+        if best.told and model.numbers > ranked[0].numbers:
+            continue
         its = replace(named, found=(*model.earlier, model.last))
         its = _beside_rivals(its, [other.last for other in ranked[k + 1 :]])
         say("whole runs with " + model.label)
