@@ -31,8 +31,10 @@ Array = NDArray[np.float64]
 
 #: Frequency (Hz) at which a body bounces on cables of the usual stiffness, and their damping ratio.
 BOUNCE, DAMPING = 20.0, 0.03
-#: Stiffnesses, in the usual one, from which a fit to rest starts: they span what is free of it.
-STIFFNESSES = (0.1, 1.0, 10.0)
+#: Stiffnesses, in the usual one, from which a fit to rest starts: wire, rope, webbing, rubber.
+STIFFNESSES = (0.1, 1.0, 10.0, 0.01)
+#: Stiffest cables that are told from rigid ones, in the usual stiffness: beyond it each step takes minutes.
+STIFFEST = 9.0
 #: Nats by which cables that stretch explain rest better, from which they do: of a rig with rigid cables
 #: chance brings two more numbers as much once in e^10 sessions (half a chi-square of two).
 GAINED = 10.0
@@ -66,10 +68,11 @@ def stretching(rig: Rig, model: RigModel, mass: float) -> tuple[RigModel, tuple[
         can_slacken=np.zeros(model.cables, dtype=np.bool_),
     )
     damping = 2.0 * DAMPING / (2.0 * np.pi * BOUNCE)
+    # Within three std: from rubber that the weight stretches to twice its length to what is as good as rigid
+    softest, stiffest = mass * rig.gravity / model.cables, STIFFEST * usual_stiffness(rig, mass)
+    middle, spread = float(np.sqrt(softest * stiffest)), float(np.log(stiffest / softest)) / 6.0
     return elastic, (
-        # Within three std: from 0.014 times what is usual, webbing on which a car sinks by decimetres, to
-        # eighteen times, beyond which nothing tells it from rigid and each step takes minutes
-        shared(STIFFNESS, "N", 0.5 * usual_stiffness(rig, mass), 1.2, layout.AXIAL_STIFFNESS, bounded=True),
+        shared(STIFFNESS, "N", middle, spread, layout.AXIAL_STIFFNESS, bounded=True),
         shared(TIME_CONSTANT, "s", damping, 1.0, layout.AXIAL_DAMPING),
     )
 
