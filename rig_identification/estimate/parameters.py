@@ -59,6 +59,13 @@ class Parameter:
     ratio: bool = False  # positive: prior_std is that of its logarithm about the nominal's
     freed: bool = False  # a doubt of the ideal model that is believed no longer
     unknown: bool = False  # of a mount that the description leaves out
+    #: Entries that it moves, and by how much each, beside what others say of them; ``index`` is none then
+    shifts: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def written(self) -> tuple[int, ...]:
+        """Entries that hold the number itself."""
+        return () if self.shifts else (self.index, *self.also)
 
     @property
     def described(self) -> bool:
@@ -366,12 +373,28 @@ class ParameterSet:
         """By kind of array: which free parameter is written where."""
         out = {}
         for kind in ("physics", "device"):
-            written = [
-                (i, entry) for i, p in enumerate(self.free) if p.kind == kind for entry in (p.index, *p.also)
-            ]
+            written = [(i, entry) for i, p in enumerate(self.free) if p.kind == kind for entry in p.written]
             pairs = np.array(written, dtype=np.int64).reshape(-1, 2)
             out[kind] = pairs[:, 0], pairs[:, 1]
         return out
+
+    @cached_property
+    def _shifts(self) -> dict[str, tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
+        """By kind of array: which free parameter moves which entry, and by how much."""
+        out = {}
+        for kind in ("physics", "device"):
+            moved = [(i, *s) for i, p in enumerate(self.free) if p.kind == kind for s in p.shifts]
+            table = np.array(moved, dtype=np.float64).reshape(-1, 3)
+            out[kind] = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2]
+        return out
+
+    def _write(self, kind: str, array: Array, theta: Array) -> None:
+        """Put the free parameters' values into the flat ``array`` of a kind."""
+        values = self.values(theta)
+        which, entries = self._entries[kind]
+        array[entries] = values[which]
+        which, entries, weights = self._shifts[kind]
+        np.add.at(array, entries, weights * values[which])
 
     def named(self, theta: Array) -> dict[str, float]:
         """Free parameters in their own units, by name."""
@@ -381,8 +404,7 @@ class ParameterSet:
         """The forward model's flat array."""
         physics: Array = self.model.physics.copy()
         physics[layout.INERTIAL : layout.INERTIAL + INERTIAL] = linear_from_log_cholesky(theta[:INERTIAL])
-        which, entries = self._entries["physics"]
-        physics[entries] = self.values(theta)[which]
+        self._write("physics", physics, theta)
         tilt = physics[layout.GRAVITY : layout.GRAVITY + 2]
         gravity = -self.model.physics[layout.GRAVITY + 2]
         physics[layout.GRAVITY + 2] = -np.sqrt(gravity**2 - tilt @ tilt)
@@ -391,8 +413,7 @@ class ParameterSet:
     def device(self, theta: Array) -> Array:
         """The devices' flat array (:class:`DeviceLayout`)."""
         device = np.zeros(self.places.size)
-        which, entries = self._entries["device"]
-        device[entries] = self.values(theta)[which]
+        self._write("device", device, theta)
         return device
 
     def directions(self) -> NDArray[np.int64]:
@@ -402,7 +423,7 @@ class ParameterSet:
     @cached_property
     def _directions(self) -> NDArray[np.int64]:
         moved = set(range(layout.INERTIAL, layout.INERTIAL + INERTIAL))
-        moved |= set(self._entries["physics"][1].tolist())
+        moved |= {*self._entries["physics"][1].tolist(), *self._shifts["physics"][1].tolist()}
         if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
             moved.add(layout.GRAVITY + 2)
         clock = [EXCITER_CLOCK] if any(p.name in EXCITER_TIMES for p in self.free) else []
@@ -419,8 +440,10 @@ class ParameterSet:
         physics = self.physics(theta)
         for column, p in enumerate(self.free, start=INERTIAL):
             if p.kind == "physics":
-                for entry in (p.index, *p.also):
+                for entry in p.written:
                     out[row_of[entry], column] = p.slope(theta[column])
+                for entry, weight in p.shifts:
+                    out[row_of[entry], column] += weight * p.slope(theta[column])
                 if layout.GRAVITY <= p.index < layout.GRAVITY + 2:
                     slope = -physics[p.index] / physics[layout.GRAVITY + 2]
                     out[row_of[layout.GRAVITY + 2], column] = p.prior_std * slope
@@ -431,7 +454,13 @@ class ParameterSet:
     def device_columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(columns of the vector, entries of ``device``, scale) of the device parameters."""
         which, entries = self._entries["device"]
-        return INERTIAL + which, entries, self._scales[1][which]
+        moving, moved, weights = self._shifts["device"]
+        std = self._scales[1]
+        return (
+            INERTIAL + np.concatenate([which, moving]),
+            np.concatenate([entries, moved]),
+            np.concatenate([std[which], weights * std[moving]]),
+        )
 
     def elements(self, theta: Array) -> Array:
         """Mass, centre of mass, inertia about it."""

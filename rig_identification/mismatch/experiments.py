@@ -29,6 +29,7 @@ _EXPERIMENTS = {
     "clock_offset": "knock on the body at rest: every device has to show it at the same instant",
     "sensor_lag": "shake at two frequencies: a lag weakens the higher one, a late clock does not",
     "cable_length": _TURNED,
+    "cable_edge": "clamp the cables where they leave the ceiling, and repeat",
     "hinge_position": _TURNED,
     "level_error": _TURNED,
     "cable_elasticity": _SUNK,

@@ -21,6 +21,7 @@ from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.sensor_errors import sensor_errors
+from rig_identification.mismatch.shared_errors import shared_errors
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3
@@ -38,6 +39,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
         *cross_sensitivity(rig, parameters, devices_of(problem)),
         *drifts(parameters, devices_of(problem), longest(problem)),
         *rig_errors(rig, parameters),
+        *shared_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]
     # What is slow has several descriptions and one place
@@ -64,7 +66,7 @@ def _written(candidate: Candidate) -> set[tuple[str, int]]:
     """Entries of the model or a device that a candidate writes; one that builds has its own."""
     if candidate.build is not None:
         return set()
-    return {(q.kind, entry) for q in candidate.parameters for entry in (q.index, *q.also)}
+    return {(q.kind, entry) for q in candidate.parameters for entry in q.written}
 
 
 def count_of(candidates: list[Candidate]) -> int:
