@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from session_samples import make_rig
 
+from rig_identification.check import readings
 from rig_identification.check import stamps as kinds
 from rig_identification.check.found import examiners
+from rig_identification.check.stamps.streams import in_order
 from rig_identification.examination import SetupFault
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 from rig_identification.session.read import clean
@@ -313,6 +315,27 @@ def test_messages_in_reverse_order_are_turned_round() -> None:
     assert (fault.where["kind"], fault.where["recordings"]) == ("backwards", ["run_0"])
     assert not errors(raw, corrected).any()
     np.testing.assert_array_equal(corrected.recordings[0].channel("imu").values, run.channel("imu").values)  # type: ignore[union-attr]
+
+
+def test_a_message_that_overtakes_another_one_is_no_spike() -> None:
+    """Samples are read in the order of measurement, however they arrived."""
+
+    def found(raw: RawSession) -> list[SetupFault]:
+        return [f.fault for examiner in examiners(readings) for f in examiner.find(raw)]
+
+    overtaken = []
+    for recording in session().recordings:
+        one = next(c for c in recording.channels if c.topic == IMU)
+        order = np.arange(len(one.stamp_ns))
+        order[[1000, 1001]] = order[[1001, 1000]]
+        moved = replace(one, stamp_ns=one.stamp_ns[order], values=one.values[order])
+        overtaken.append(recording.with_channels(moved))
+    raw = replace(session(), recordings=tuple(overtaken))
+    assert found(in_order(raw)) == []
+    assert found(raw) != []
+    for right, sorted_again in zip(session().recordings, in_order(raw).recordings, strict=True):
+        for a, b in zip(right.channels, sorted_again.channels, strict=True):
+            np.testing.assert_array_equal(a.values, b.values)
 
 
 def test_a_device_without_any_times_is_left_out() -> None:

@@ -15,6 +15,7 @@ from rig_identification.check.found import examiners
 from rig_identification.check.inventory import inventory
 from rig_identification.check.left_aside import left_aside
 from rig_identification.check.order import out_of_order
+from rig_identification.check.stamps.streams import in_order
 from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
 
@@ -37,6 +38,7 @@ def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> E
             for found in examiner.find(session):
                 session = found.session
                 faults.append(found.fault)
+        session = in_order(session)
     if progress is not None:
         progress("checking how channels agree")
     verdict = judged(session)

@@ -24,6 +24,8 @@ _EXPERIMENTS = {
     "load_cell_gain": _KNOWN_WEIGHT,
     "load_cell_offset": _KNOWN_WEIGHT,
     "exciter_gain": "weigh the unbalance and measure its radius: that gives the force without any cell",
+    "exciter_position": "shake in two planes: what a lever adds turns with the force",
+    "exciter_misalignment": "tilt the body at rest: the exciter's cells feel the weight of the motor",
     "inclinometer_offset": "turn the inclinometer by 180 degrees on its mount, then the body: its own error "
     "stays, a tilt changes sides",
     "clock_offset": "knock on the body at rest: every device has to show it at the same instant",

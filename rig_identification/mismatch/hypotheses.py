@@ -17,6 +17,7 @@ from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
 from rig_identification.mismatch.drifts import drifts
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
+from rig_identification.mismatch.mount_errors import mount_errors
 from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
@@ -39,6 +40,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
         *cross_sensitivity(rig, parameters, devices_of(problem)),
         *drifts(parameters, devices_of(problem), longest(problem)),
         *rig_errors(rig, parameters),
+        *mount_errors(rig, parameters),
         *shared_errors(rig, parameters),
         *left_out_physics(rig, parameters, mass),
     ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.parameters import Parameter, ParameterSet
+from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.rig_errors import LENGTH_RANGE
 from rig_identification.mismatch.sensor_errors import RANGE
@@ -36,7 +36,7 @@ def shared_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
     cells = [c.name for c in rig.cables if f"{c.name}.load_cell_gain" in names]
     if len(cells) > 1:
         out.append(_gains([parameters.places.load_cell(name) for name in cells]))
-    return out
+    return [*out, *_scales(parameters)]
 
 
 def _shared(name: str, unit: str, std: float, kind: str, shifts: list[tuple[int, float]]) -> Parameter:
@@ -70,6 +70,26 @@ def _gains(cells: list[int]) -> Candidate:
         {"channel": ALL, "axis": None},
         name_in_result="gain",
     )
+
+
+def _scales(parameters: ParameterSet) -> list[Candidate]:
+    """Every axis of a gyroscope, or of an accelerometer, reads too much by the same share."""
+    out = []
+    for kind in ("gyroscope", "accelerometer"):
+        own = [p.index for p in parameters.free if p.name in {f"imu.{kind}_scale.{a}" for a in AXES}]
+        if len(own) == len(AXES):
+            shifts = [(index, 1.0) for index in own]
+            out.append(
+                Candidate(
+                    "imu_scale",
+                    (_shared(f"imu.{kind}_scale", "1", RANGE[f"{kind}_scale"], "device", shifts),),
+                    f"All axes of the {kind} have the same scale error of {{value}}.",
+                    "Check its range and the unit that the driver writes, and calibrate it.",
+                    {"channel": "imu", "axis": None},
+                    name_in_result="scale",
+                )
+            )
+    return out
 
 
 def _edges(model: RigModel) -> Candidate:

@@ -21,12 +21,15 @@ def find(session: RawSession) -> tuple[Found, ...]:
 
 
 def _mend(stream: Stream) -> Mended | None:
-    times = seconds(stream.stamps)
+    # A message that overtook another one does not count
+    order = np.argsort(stream.stamps, kind="stable")
+    times = seconds(stream.stamps[order])
     grid = evenly_spaced(times)
     if grid is None or np.ptp(grid.late) == 0.0:
         return None
-    gain = measured_evenly(stream.channel.values, grid.late, grid.interval, grid.index)
-    stamps = stream.stamps[0] + np.round(grid.times * SECOND).astype(np.int64)
+    gain = measured_evenly(stream.channel.values[order], grid.late, grid.interval, grid.index)
+    stamps = stream.stamps.copy()
+    stamps[order] = stream.stamps[order[0]] + np.round(grid.times * SECOND).astype(np.int64)
     facts = {
         "jitter": float(np.std(grid.late)), "most": float(np.max(np.abs(grid.late))),
         "interval": grid.interval, "lost": 1.0 - len(times) / (1.0 + float(grid.index[-1] - grid.index[0])),

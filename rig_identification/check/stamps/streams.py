@@ -114,3 +114,26 @@ def _changed(session: RawSession, change: Callable[[RawChannel, tuple[int, str]]
         channels = tuple(change(channel, (place, channel.topic)) for channel in recording.channels)
         recordings.append(replace(recording, channels=channels))
     return replace(session, recordings=tuple(recordings))
+
+
+def in_order(session: RawSession) -> RawSession:
+    """The session with each topic's samples in the order in which they were measured.
+
+    A message that overtakes another one on its way is ordinary. Read in the order of arrival, its sample would
+    stand between two of other times, and look like a spike.
+    """
+
+    def ordered(channel: RawChannel) -> RawChannel:
+        order = np.argsort(channel.stamp_ns, kind="stable")
+        return replace(
+            channel,
+            stamp_ns=channel.stamp_ns[order],
+            received_ns=channel.received_ns[order],
+            values=channel.values[order],
+        )
+
+    def changed(recording: RawRecording) -> RawRecording:
+        mixed = (c for c in recording.channels if np.any(np.diff(c.stamp_ns) < 0))
+        return recording.with_channels(*(ordered(c) for c in mixed))
+
+    return replace(session, recordings=tuple(changed(r) for r in session.recordings))
