@@ -119,8 +119,8 @@ def _changed(session: RawSession, change: Callable[[RawChannel, tuple[int, str]]
 def in_order(session: RawSession) -> RawSession:
     """The session with each topic's samples in the order in which they were measured.
 
-    A message that overtakes another one on its way is ordinary. Read in the order of arrival, its sample would
-    stand between two of other times, and look like a spike.
+    A message that overtakes another one on its way is ordinary. Read in the order of arrival, its sample
+    would stand between two of other times, and look like a spike.
     """
 
     def ordered(channel: RawChannel) -> RawChannel:
