@@ -17,6 +17,7 @@ from rig_identification.result import Finding, Identification, Interrupted, Mism
 from rig_identification.session import clean
 
 Progress = Callable[[str, float], None]
+Watcher = Callable[[Identification], None]
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,26 @@ class Prepared:
 
     session: Session  # corrected and cleaned
     examination: Examination | None  # None: a session in memory, which nobody wired
+
+
+def check_raw(raw: RawSession, progress: Callable[[str], None] | None = None) -> Examined:
+    """Examine a session. One that ``identify`` will refuse bears a warning that says why.
+
+    Raises
+    ------
+    InputError
+        The session cannot be used, and no fault that was found says why.
+    """
+    found = examine(raw, progress)
+    try:
+        clean(found.session)
+    except InputError as error:
+        if not found.examination.faults:
+            raise
+        refused = f"identify cannot use the session as it is: {error}."
+        warnings = (*found.examination.warnings, refused)
+        return replace(found, examination=replace(found.examination, warnings=warnings))
+    return found
 
 
 def prepare(raw: RawSession, progress: Callable[[str], None] | None = None) -> Prepared:
@@ -52,12 +73,16 @@ def prepare_examined(examined: Examined) -> Prepared:
 
 
 def identify_prepared(
-    prepared: Prepared, progress: Progress | None = None, work: float | None = None
+    prepared: Prepared,
+    progress: Progress | None = None,
+    work: float | None = None,
+    watcher: Watcher | None = None,
 ) -> Identification:
     """Identify the body, and tell the faults of the set-up with what the fit found.
 
     work: units of work after which the search for what the ideal model leaves out begins nothing new; None:
-    as many as mismatch/budget.py has.
+    as many as mismatch/budget.py has. watcher: is shown each better answer while the search runs, without
+    what the examination found.
 
     Raises
     ------
@@ -69,7 +94,7 @@ def identify_prepared(
     from rig_identification.search.identify import identify  # compiles: not before a session is there
 
     try:
-        found = identify(prepared.session, progress=progress, work=work)
+        found = identify(prepared.session, progress=progress, work=work, watcher=watcher)
     except Interrupted as stopped:
         raise Interrupted(with_examination(stopped.answer, prepared.examination)) from stopped
     return with_examination(found, prepared.examination)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig_identification.api.reading import Progress, Recorded, read
-from rig_identification.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,18 +112,9 @@ def check(
     InputError
         The session cannot be used, and no fault that was found says why.
     """
-    from rig_identification.check.examine import examine
-    from rig_identification.session import clean
+    from rig_identification.identification import check_raw
 
     given = session if isinstance(session, Recorded) else None
     recorded = given or read(Path(str(session)), namespace=namespace, topics=topics, progress=progress)
-    found = examine(recorded.raw, progress)
-    examination = found.examination
-    try:
-        clean(found.session)
-    except InputError as error:
-        if not examination.faults:
-            raise
-        refused = f"identify cannot use the session as it is: {error}."
-        examination = replace(examination, warnings=(*examination.warnings, refused))
-    return Check(examination, found, recorded)
+    found = check_raw(recorded.raw, progress)
+    return Check(found.examination, found, recorded)

@@ -64,9 +64,8 @@ def identify(
         session = read(session, namespace=namespace, topics=topics, progress=progress)
     prepared = _prepared(session, progress)
     digests = _digests(session, progress)
-    options = {} if work is None else {"work": work}
     try:
-        answer = identify_prepared(prepared, progress, **options)
+        answer = identify_prepared(prepared, progress, work)
     except Interrupted as stopped:
         raise Stopped(Result(stopped.answer, prepared.session, digests)) from stopped
     return Result(answer, prepared.session, digests)

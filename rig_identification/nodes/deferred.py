@@ -19,7 +19,6 @@ from typing import Any
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
 #: s between two attempts to send an answer, and after which it is given up.
 AGAIN, GIVEN_UP = 0.25, 10.0
@@ -29,15 +28,15 @@ class Later:
     """An answer that is still to come."""
 
     def __init__(self) -> None:
-        self._send: Callable[[Trigger.Response], None] | None = None
-        self._answer: Trigger.Response | None = None
+        self._send: Callable[[bool, str], None] | None = None
+        self._answer: tuple[bool, str] | None = None
 
     def answer(self, success: bool, message: str) -> None:
         """Send the answer; a client that is gone hears nothing, and nothing happens."""
-        self._answer = Trigger.Response(success=success, message=message)
+        self._answer = success, message
         self._flush()
 
-    def bind(self, send: Callable[[Trigger.Response], None]) -> None:
+    def bind(self, send: Callable[[bool, str], None]) -> None:
         """Where the answer goes."""
         self._send = send
         self._flush()
@@ -45,21 +44,25 @@ class Later:
     def _flush(self) -> None:
         if self._send is not None and self._answer is not None:
             send, self._send = self._send, None
-            send(self._answer)
+            send(*self._answer)
 
 
 def serve_later(
     node: Node,
+    kind: type,
     name: str,
-    begin: Callable[[], Later | Trigger.Response],
+    begin: Callable[[Any, Any], tuple[bool, str] | Later],
     group: CallbackGroup | None = None,
 ) -> None:
-    """Offer a Trigger service; ``begin`` answers at once or returns a :class:`Later`."""
+    """Offer a service whose responses hold ``success`` and ``message``.
+
+    begin: given request and response, it returns both or a :class:`Later` that will. Whatever else the
+    response holds, it fills in, until then.
+    """
     clock = Clock(clock_type=ClockType.STEADY_TIME)
 
-    def call(request: Trigger.Request, response: Trigger.Response) -> Any:
-        _ = request, response
-        return begin()
+    def call(request: object, response: object) -> Any:
+        return begin(request, response), response
 
     def after(seconds: float, work: Callable[[], None]) -> None:
         def once() -> None:
@@ -68,17 +71,20 @@ def serve_later(
 
         timer = node.create_timer(seconds, once, clock=clock)
 
-    service = node.create_service(Trigger, name, call, callback_group=group)
+    service = node.create_service(kind, name, call, callback_group=group)
     send_now = service.send_response
 
-    def send_response(answer: Later | Trigger.Response, header: object) -> None:
-        def send(response: Trigger.Response) -> None:
+    def send_response(answered: tuple[tuple[bool, str] | Later, Any], header: object) -> None:
+        answer, response = answered
+
+        def send(success: bool, message: str) -> None:
+            response.success, response.message = success, message
             send_until_heard(lambda: send_now(response, header), after)
 
         if isinstance(answer, Later):
             answer.bind(send)
         else:
-            send(answer)
+            send(*answer)
 
     service.send_response = send_response  # type: ignore[method-assign, assignment]
 

@@ -5,27 +5,29 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped
+from rclpy.time import Time
 from std_msgs.msg import Float64MultiArray, String
 
 from rig_identification.errors import InputError
 from rig_identification.nodes.bag_keeper import BagKeeper
+from rig_identification.nodes.chosen_session import chosen_session
 from rig_identification.nodes.deferred import Later
-from rig_identification.nodes.fit_process import FitProcess
+from rig_identification.nodes.fits import Fits, Job, Request
 from rig_identification.nodes.intake import Intake
 from rig_identification.nodes.parameters import OwnParameter, one_of, within
 from rig_identification.nodes.recording_parameters import RECORDING, planned
 from rig_identification.nodes.result_messages import inertia_message, matrix_message, mismatch_message
 from rig_identification.nodes.rig_node import ERROR, LATCHED, OK, RigNode, diagnostic
 from rig_identification.nodes.running import RunningEstimator
-from rig_identification.nodes.session_folder import SessionFolder
+from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
-from rig_identification.session.session_description import read_session_description
+from rig_identification.nodes.typed import typed_interface
 from rig_identification.topics import expected_topics
 
 PARAMETERS = (
@@ -50,15 +52,23 @@ PARTS = {
 }
 
 
-@dataclass
-class Request:
-    """A fit under way and who waits for it."""
+class ByTrigger:
+    """A Trigger request that waits for a fit."""
 
-    run: int
-    name: str
-    later: Later
-    process: FitProcess
-    basis: tuple[str, ...]  # what the fit rests on
+    def __init__(self, told: Callable[[dict[str, Any]], str]) -> None:
+        self.later = Later()
+        self._told = told
+
+    def hear(self, stage: str, fraction: float, numbers: dict[str, Any] | None) -> None:
+        """Progress has a topic of its own."""
+
+    def answer(self, latest: dict[str, Any]) -> None:
+        """The fit went well."""
+        self.later.answer(True, self._told(latest))
+
+    def fail(self, message: str) -> None:
+        """There is no answer."""
+        self.later.answer(False, message)
 
 
 class IdentifierNode(RigNode):
@@ -77,12 +87,10 @@ class IdentifierNode(RigNode):
         self.windows = SessionFolder(folder, self._description, topics, self.own.text("storage"))
         self.intake = Intake(self, topics, self.own.whole("depth"), watch_range=True)
         self.running = RunningEstimator(self, self._description, self.own.number("running_rate"))
-        self.request: Request | None = None
-        self.latest: dict[str, Any] | None = None  # answer of the latest fit that went well
-        self._basis: tuple[str, ...] = ()
-        self._runs = 0
+        self.fits = Fits(lambda: self.get_clock().now().nanoseconds / 1e9, self._tell, self._publish)
         self.keeper = BagKeeper(self, self.windows, self.intake)
         self._offer()
+        self.typed = typed_interface(self)
         self.every(self.own.number("period"), self._work)
 
     def _offer(self) -> None:
@@ -103,12 +111,26 @@ class IdentifierNode(RigNode):
     # Windows
 
     def _start_window(self) -> str:
-        plan = planned(self.own, {done.name for done in self.windows.done})
+        return self.open_window(planned(self.own, self.taken_names()))
+
+    def taken_names(self) -> set[str]:
+        """Names of the windows that are complete."""
+        return {done.name for done in self.windows.done}
+
+    def open_window(self, plan: RecordingPlan) -> str:
+        """Open a window; returns what to tell. Raises InputError."""
         self.keeper.start(plan)
         self.running.listen(plan.kind == "dynamic")
         return f"window {plan.name} ({plan.kind}) is open"
 
     def _stop_window(self) -> Later:
+        return self.close_window(lambda plan, counts, silent: None)
+
+    def close_window(self, closed: Callable[[RecordingPlan, dict[str, int], list[str]], None]) -> Later:
+        """End the open window; the answer comes when all that was sent before is there. Raises InputError.
+
+        closed: is given the window, its messages by topic, and the topics that were silent.
+        """
         self._work()
         plan = self.windows.plan
         if plan is None:
@@ -119,6 +141,7 @@ class IdentifierNode(RigNode):
 
         def told(counts: dict[str, int]) -> str:
             missing = [name for name in self._expected() if not counts.get(name)]
+            closed(plan, counts, missing)
             silent = f"; silent: {', '.join(missing)}" if missing else ""
             return f"window {plan.name}: {sum(counts.values())} messages on {len(counts)} topics{silent}"
 
@@ -131,87 +154,47 @@ class IdentifierNode(RigNode):
         return [name for name, gate in gates.items() if gate.received or topics[name].channel == "tension"]
 
     def _clear_windows(self) -> str:
-        if self.windows.plan is not None or self.request is not None:
+        if self.windows.plan is not None or self.fits.request is not None:
             raise InputError("a window is open or a fit runs; end it first")
         for plan in self.windows.done:
             shutil.rmtree(self.windows.folder / plan.name, ignore_errors=True)
         count, self.windows.done[:] = len(self.windows.done), []
         (self.windows.folder / "session.yaml").unlink(missing_ok=True)
         self.running.forget()
+        self.fits.forget_job()
         return f"{count} windows are gone"
 
     # Requests
 
-    def _begin(self, name: str) -> str | Later:
-        """The answer, or that it comes with the fit that begins."""
-        if self.request is not None:
-            r = self.request
-            done = f"{100.0 * r.process.fraction:.0f} % done ({r.process.stage})"
-            raise InputError(f"busy: {r.name}, run {r.run}, is {done}; wait for it or call ~/cancel")
-        session, basis = self._chosen()
-        if self.latest is not None and basis == self._basis:
-            return self._answer(name)  # the same data give the same result
-        self._runs += 1
-        later = Later()
-        self.request = Request(self._runs, name, later, FitProcess(session), basis)
-        return later
+    def _begin(self, name: str) -> Later:
+        """What the answer comes by, with the fit that begins or at once."""
+        self.fits.refuse_when_busy()
+        asker = ByTrigger(lambda latest: self._answer(name, latest))
+        self.fits.begin(name, Job(*self.chosen(self.own.text("session"), self.own.words("windows"))), asker)
+        return asker.later
 
-    def _chosen(self) -> tuple[Path, tuple[str, ...]]:
-        """Session file to fit and what it rests on. Raises InputError."""
-        path, names = self.own.text("session"), self.own.words("windows")
-        if path:
-            description = read_session_description(Path(path).expanduser())
-            file, known = description.file, [entry.name for entry in description.entries]
-            stamps = tuple(
-                str(entry.folder.stat().st_mtime_ns) for entry in description.entries if entry.folder.exists()
-            )
-        else:
-            if not self.windows.done:
-                open_one = self.windows.plan
-                told = (
-                    f"window {open_one.name} is still open; call ~/stop_window and wait for its answer"
-                    if open_one
-                    else "call ~/start_window"
-                )
-                raise InputError(f"no window is complete: {told}, or set the parameter session")
-            file, known, stamps = (
-                self.windows.folder / "session.yaml",
-                [p.name for p in self.windows.done],
-                (),
-            )
-        unknown = [name for name in names if name not in known]
-        if unknown:
-            raise InputError(f"parameter windows: {', '.join(unknown)} is none of {', '.join(known)}")
-        chosen = list(names) or known
-        if names and not path:
-            entries = [plan.entry() for plan in self.windows.done if plan.name in names]
-            file = self.windows.write_yaml("chosen.yaml", {"rig": "rig.yaml", "recordings": entries})
-        elif names:
-            raise InputError(
-                "parameter windows: chooses among windows; a session is taken whole: set windows empty"
-            )
-        return file, (str(file), *chosen, *stamps)
+    def chosen(self, session: str, names: Sequence[str]) -> tuple[Path, tuple[str, ...]]:
+        """Session file to use and what an answer rests on. Raises InputError."""
+        return chosen_session(self.windows, session, names)
+
+    def latest(self) -> dict[str, Any]:
+        """Answer of the latest fit that went well. Raises InputError: there is none."""
+        if self.fits.latest is None:
+            raise InputError("nothing was identified yet; call ~/identify_inertia")
+        return self.fits.latest
 
     def _latest(self, name: str) -> str:
-        if self.latest is None:
-            raise InputError("nothing was identified yet; call ~/identify_inertia")
-        return self._answer(name)
+        return self._answer(name, self.latest())
 
-    def _answer(self, name: str) -> str:
-        assert self.latest is not None
-        result = self.latest["result"]
+    def _answer(self, name: str, latest: dict[str, Any]) -> str:
+        result = latest["result"]
         parts = {part: result[part] for part in PARTS[name]}
-        about = {key: self.latest[key] for key in ("run", "stamp", "recordings", "converged", "notes")}
-        verdict = {"verdict": result["mismatch"]["verdict"], "explanation": self.latest["explanation"]}
+        about = {key: latest[key] for key in ("run", "stamp", "recordings", "converged", "notes")}
+        verdict = {"verdict": result["mismatch"]["verdict"], "explanation": latest["explanation"]}
         return json.dumps({**about, **verdict, **parts}, allow_nan=False)
 
     def _cancel(self) -> str:
-        if self.request is None:
-            raise InputError("nothing runs that could be cancelled")
-        request, self.request = self.request, None
-        request.process.end()
-        request.later.answer(False, f"{request.name}, run {request.run}, was cancelled")
-        return f"{request.name}, run {request.run}, is cancelled"
+        return self.fits.cancel()
 
     # Work
 
@@ -220,37 +203,25 @@ class IdentifierNode(RigNode):
             self.running.add(batch)
             self.keeper.write(batch)
         self.keeper.look()
-        if self.request is not None:
-            self._watch(self.request)
+        self.fits.look()
+        self.typed.look()
 
-    def _watch(self, request: Request) -> None:
-        before = (request.process.stage, request.process.fraction)
-        over = request.process.look()
-        if before != (request.process.stage, request.process.fraction):
-            told = {"run": request.run, "request": request.name}
-            told |= {"stage": request.process.stage, "fraction": request.process.fraction}
-            self._progress.publish(String(data=json.dumps(told)))
-        if not over:
-            return
-        self.request = None
-        request.process.end()
-        answer = request.process.answer or {}
-        if answer["kind"] == "error":
-            request.later.answer(False, str(answer["message"]))
-            return
-        now = self.get_clock().now()
-        self.latest = {**answer, "run": request.run, "stamp": now.nanoseconds / 1e9}
-        self._basis = request.basis
-        request.later.answer(True, self._answer(request.name))
-        stamp = now.to_msg()
-        self._inertia.publish(inertia_message(answer["result"], stamp))
-        self._covariance.publish(matrix_message(answer["result"]["covariance"]))
-        self._mismatch.publish(mismatch_message(answer, stamp))
-        self._result.publish(String(data=json.dumps(self.latest, allow_nan=False)))
+    def _tell(self, request: Request) -> None:
+        told = {"run": request.run, "request": request.name}
+        told |= {"stage": request.process.stage, "fraction": request.process.fraction}
+        self._progress.publish(String(data=json.dumps(told)))
+
+    def _publish(self, latest: dict[str, Any]) -> None:
+        stamp = Time(nanoseconds=round(latest["stamp"] * 1e9)).to_msg()
+        self._inertia.publish(inertia_message(latest["result"], stamp))
+        self._covariance.publish(matrix_message(latest["result"]["covariance"]))
+        self._mismatch.publish(mismatch_message(latest, stamp))
+        self._result.publish(String(data=json.dumps(latest, allow_nan=False)))
+        self.typed.publish(latest)
 
     def status(self) -> list[DiagnosticStatus]:
         """Windows, the fit under way, and every topic."""
-        plan, request = self.windows.plan, self.request
+        plan, request = self.windows.plan, self.fits.request
         message = f"window {plan.name} is open" if plan else f"{len(self.windows.done)} windows"
         if request is not None:
             message += f"; {request.name}, run {request.run}: {request.process.stage}"
@@ -259,21 +230,18 @@ class IdentifierNode(RigNode):
             self.keeper.trouble or message,
             messages=sum(self.windows.counts.values()), done=[done.name for done in self.windows.done],
         )  # fmt: skip
-        return [*super().status(), line, *stream_status(self, self.intake)]
+        interface = diagnostic(f"{self.get_name()}: interface", OK, self.typed.told)
+        return [*super().status(), line, interface, *stream_status(self, self.intake)]
 
     def close(self) -> None:
         """End the fit, finish the window, and leave no temporary folder."""
-        if self.request is not None:
-            self.request.process.end()
-        self._work_quietly()
+        self.fits.close()
+        self.typed.close()
+        if not self._temporary:
+            self._work()
         self.keeper.close()
         if self._temporary:
             shutil.rmtree(self.windows.folder, ignore_errors=True)
-
-    def _work_quietly(self) -> None:
-        self.request = None
-        if not self._temporary:
-            self._work()
 
 
 def create() -> IdentifierNode:

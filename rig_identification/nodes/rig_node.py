@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.callback_groups import CallbackGroup
@@ -100,14 +101,25 @@ class RigNode(Node):
         """Offer a Trigger service; ``answer`` returns the message or what it will come by, or raises what
         the caller is told.
         """
+        self.serve_typed(Trigger, name, lambda _, response: answer(), group)
 
-        def call() -> Later | Trigger.Response:
-            success, message = self.outcome(answer)
-            if isinstance(message, Later):
-                return message
-            return Trigger.Response(success=success, message=message)
+    def serve_typed(
+        self,
+        kind: type,
+        name: str,
+        answer: Callable[[Any, Any], str | Later],
+        group: CallbackGroup | None = None,
+    ) -> None:
+        """Offer a service whose responses hold ``success`` and ``message``, as :meth:`serve` does.
 
-        serve_later(self, name, call, group)
+        answer: given request and response; it fills in whatever else the response holds.
+        """
+
+        def call(request: object, response: object) -> tuple[bool, str] | Later:
+            success, message = self.outcome(lambda: answer(request, response))
+            return message if isinstance(message, Later) else (success, message)
+
+        serve_later(self, kind, name, call, group)
 
     def outcome(self, answer: Callable[[], str | Later]) -> tuple[bool, str | Later]:
         """(success, message or what it will come by) of a request."""

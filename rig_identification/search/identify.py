@@ -44,6 +44,7 @@ from rig_identification.search.explain import explain
 from rig_identification.search.so_far import SoFar, accounted, both_accounted, interrupted, with_work_told
 
 Progress = Callable[[str, float], None]
+Watcher = Callable[[Identification], None]
 
 #: Share of the progress bar that the ideal model's fit takes.
 IDEAL_SHARE = 0.4
@@ -54,11 +55,13 @@ def identify(
     progress: Progress | None = None,
     assumed: Assumed | None = None,
     work: float | None = None,
+    watcher: Watcher | None = None,
 ) -> Identification:
     """Mass, centre of mass and inertia tensor, with whatever the ideal model leaves out found and modelled.
 
     assumed: what another ideal model than this project's assumes, the thesis' for one. work: units of work
-    after which the search for what is left out begins nothing new; None: as many as budget.py has.
+    after which the search for what is left out begins nothing new; None: as many as budget.py has. watcher:
+    is shown the ideal model's answer, then each better one, while the search runs; the answer stays the same.
     ``figures["ideal"]`` of the result holds the ideal model's own answer where effects were found.
 
     Raises
@@ -87,18 +90,25 @@ def identify(
         found = found if origins.given else told(found, origins)
         return replace(found, vehicle=vehicle_quantities(found.without_frame or found.total, given))
 
+    def seen(found: Identification) -> None:
+        if watcher is not None:
+            watcher(ended(found))
+
+    shown = None if watcher is None else seen
     with counted():
         try:
-            return ended(_driven(session, notify, assumed, WORK if work is None else work))
+            return ended(_driven(session, notify, assumed, WORK if work is None else work, shown))
         except CannotBeFollowed as why:
             return ended(unanswered(session, why))
         except Interrupted as stopped:
             raise Interrupted(ended(stopped.answer)) from stopped
 
 
-def _driven(session: Session, notify: Progress, assumed: Assumed | None, work: float) -> Identification:
+def _driven(
+    session: Session, notify: Progress, assumed: Assumed | None, work: float, watcher: Watcher | None
+) -> Identification:
     """The answer to a session, without the runs that a force drives which was not recorded."""
-    found, ideal = _identified(session, notify, assumed, work)
+    found, ideal = _identified(session, notify, assumed, work, watcher)
     less = None
     if found.mismatch.verdict == "unexplained" and all(
         f.effect == "unknown" for f in found.mismatch.findings
@@ -107,7 +117,7 @@ def _driven(session: Session, notify: Progress, assumed: Assumed | None, work: f
         less = without_unseen_force(session, ideal, lambda run: True)
     if less is not None:
         try:
-            rest, _ = _identified(less.session, notify, assumed, work)
+            rest, _ = _identified(less.session, notify, assumed, work, watcher)
         except KeyboardInterrupt as stopped:
             raise Interrupted(interrupted(found)) from stopped
         found = _without_unseen(found, rest, less.note)
@@ -162,7 +172,7 @@ def _firm(found: Explained) -> bool:
 
 
 def _identified(
-    session: Session, notify: Progress, assumed: Assumed | None, work: float
+    session: Session, notify: Progress, assumed: Assumed | None, work: float, watcher: Watcher | None
 ) -> tuple[Identification, Fitted]:
     """The answer to a session, and the ideal model's fit. Raises Interrupted once there is an answer."""
 
@@ -171,8 +181,9 @@ def _identified(
 
     budget = Budget(work)
     fitted = fit_session(session, fitting, assumed)
-    so_far = SoFar(session, Ideal(fitted, *judged(fitted)), budget)
+    so_far = SoFar(session, Ideal(fitted, *judged(fitted)), budget, watcher=watcher)
     try:
+        so_far.show()
         return accounted(so_far.widened(_searched(so_far, notify)), budget), fitted
     except KeyboardInterrupt as stopped:
         raise Interrupted(so_far.interrupted()) from stopped
@@ -191,6 +202,7 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
         watched = _watched(ideal, searching, budget)
         if watched is not None:
             swinging = so_far.swinging = _answer_of(watched, session, plain)
+            so_far.show()
             if not _worth_a_search(watched):
                 return swinging
     found, note = None, None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from rig_identification.estimate.without_frame import vehicle_alone
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.explained import Explained
+from rig_identification.model.work import counted
 from rig_identification.recording import Session
 from rig_identification.result import Identification, Work
 from rig_identification.search.following import with_what_follows
@@ -40,11 +42,15 @@ class SoFar:
     found: Explained | None = None  # what explains the session
     swinging: Identification | None = None  # the answer to a body that is only watched
     rung: Rung | None = None  # the last model with a discrepancy
+    watcher: Callable[[Identification], None] | None = (
+        None  # is shown each better answer while the search runs
+    )
 
     def hear(self, found: Explained) -> None:
         """Keep what explains the session; what leaves only noise is not given up for what leaves a trace."""
         if found.wholly or self.found is None or not self.found.wholly:
             self.found = found
+            self.show()
 
     def see(self, rung: Rung) -> None:
         """Keep the last model with a discrepancy."""
@@ -56,10 +62,24 @@ class SoFar:
 
     def interrupted(self) -> Identification:
         """The answer where the search is broken off here, marked so."""
+        return interrupted(accounted(self._until_now(), self.budget))
+
+    def show(self) -> None:
+        """Show the answer until now to whoever watches. What this computes is no work of the answer's."""
+        if self.watcher is None:
+            return
+        with counted():
+            try:
+                answer = self._until_now()
+            except (FloatingPointError, np.linalg.LinAlgError):
+                return  # no numbers yet, as where a search ends early; the next answer is shown
+        self.watcher(answer)
+
+    def _until_now(self) -> Identification:
         answer = self.swinging or self._plain()
         if self.found is not None:
             answer = self._composed(not_weighed(self.found), self._plain())
-        return interrupted(accounted(self.widened(answer), self.budget))
+        return self.widened(answer)
 
     def widened(self, answer: Identification) -> Identification:
         """The answer; where nothing explains the session, with the body that a missing wrench leaves open."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from rig_identification.errors import InputError
@@ -45,6 +45,16 @@ def file_digests(path: Path, progress: Callable[[str], None] | None = None) -> d
         except OSError as error:
             raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
     return found
+
+
+def session_digest(digests: Mapping[str, str]) -> str:
+    """SHA-256, in hexadecimal, of a whole session: of the lines that ``sha256sum`` prints for its files.
+
+    digests: of :func:`file_digests`. Two sessions with the same hash hold the same recordings, rig description
+    and session description under the same names.
+    """
+    lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
+    return hashlib.sha256(lines.encode()).hexdigest()
 
 
 def files_at(*paths: Path) -> Iterator[Path]:
