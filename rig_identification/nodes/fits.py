@@ -1,4 +1,4 @@
-"""Fits that the identifier is asked for: one at a time, in a process of its own, and the latest that went well."""
+"""Fits that the identifier is asked for: one at a time, in a process of its own, and the latest answer."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from rig_identification.errors import InputError
 from rig_identification.files import nearest_existing
 from rig_identification.nodes.worker_process import WorkerProcess
 
-#: s that an interrupted fit gets to say its best answer until then. It heeds the interrupt between two compiled
-#: calls, which take up to a second, and composing an answer takes one or two; ten times as long on a busy machine.
+#: s that an interrupted fit gets to say its best answer until then. It heeds the interrupt between two
+#: compiled calls, which take up to a second; composing and writing an answer takes a few. A busy machine takes
+#: several times as long.
 PATIENCE = 20.0
 
 
@@ -26,6 +27,7 @@ class Job:
     basis: tuple[str, ...]  # what the answer rests on: the same basis gives the same answer
     work: float | None = None  # units of work; None: the default
     out: Path | None = None  # folder for result.json and report.html; None: not written
+    elsewhere: bool = False  # whether files that were written to another folder before will do
 
 
 class Asker(Protocol):
@@ -78,11 +80,6 @@ class Fits:
         self._job: Job | None = None  # that the latest answers
         self._runs = 0
 
-    @property
-    def next_run(self) -> int:
-        """Number that the next fit will have."""
-        return self._runs + 1
-
     def refuse_when_busy(self) -> None:
         """Raise InputError where a fit runs."""
         if self.request is not None:
@@ -115,15 +112,12 @@ class Fits:
         """Fit anew whatever is asked next: the recordings of the latest answer are gone."""
         self._job = None
 
-    def folder_of(self, session: Path) -> Path | None:
-        """Folder of the latest answer's files, if it is to this session."""
-        return self._job.out if self._job is not None and self._job.session == session else None
-
     @staticmethod
     def _answers(done: Job, asked: Job) -> bool:
         """Whether what was done answers what is asked."""
         same = (done.session, done.basis, done.work) == (asked.session, asked.basis, asked.work)
-        return same and asked.out in (None, done.out)
+        there = asked.out in (None, done.out) or (asked.elsewhere and done.out is not None)
+        return same and there
 
     def look(self) -> None:
         """Take in what the fit said, and hand on its answer."""
@@ -157,7 +151,7 @@ class Fits:
         request.asker.answer(told)
 
     def cancel(self) -> str:
-        """End the fit that runs, now and without an answer; its asker is told. Raises InputError: none runs."""
+        """End the fit that runs, at once and without an answer. Raises InputError: none runs."""
         if self.request is None:
             raise InputError("nothing runs that could be cancelled")
         request, self.request = self.request, None

@@ -1,7 +1,8 @@
-"""The action ``~/identify_inertia``: a fit with its progress and its numbers until now, which may be cancelled."""
+"""The action ``~/identify_inertia``: a fit with its progress and its numbers until now, to be cancelled."""
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,13 +78,13 @@ class IdentifyAction:
         if not request.work >= 0.0:
             raise InputError(f"work {request.work}: give units of work above 0, or 0 for the default")
         session, basis = self._node.chosen(request.session, list(request.windows))
-        out = Path(request.out).expanduser() if request.out else self._new_folder(session)
-        return Job(session, basis, request.work or None, out)
+        out = Path(request.out).expanduser() if request.out else self._new_folder()
+        return Job(session, basis, request.work or None, out, elsewhere=not request.out)
 
-    def _new_folder(self, session: Path) -> Path:
-        """Folder of the node for an answer; the same for the same session, so that it is not fitted again."""
-        fits, root = self._node.fits, self._node.windows.folder
-        return fits.folder_of(session) or root / f"result_{fits.next_run}"
+    def _new_folder(self) -> Path:
+        """A folder beside the windows that is not there yet."""
+        root = self._node.windows.folder
+        return next(folder for n in count(1) if not (folder := root / f"result_{n}").exists())
 
     def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         request = self._node.fits.request

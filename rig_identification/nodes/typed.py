@@ -1,4 +1,4 @@
-"""Whether the identifier offers typed services and an action beside the Trigger services, and which is said."""
+"""Whether the identifier offers typed services and an action beside the Trigger services."""
 
 from __future__ import annotations
 

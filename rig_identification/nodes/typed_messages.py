@@ -1,4 +1,4 @@
-"""An answer in result.json's terms as messages of rig_identification_interfaces; what was not determined is NaN."""
+"""An answer in result.json's terms as messages of rig_identification_interfaces; NaN: not determined."""
 
 from __future__ import annotations
 
