@@ -161,12 +161,12 @@ class Graph:
     def end(
         self, process: subprocess.Popen[str], number: int = signal.SIGINT, within: float = 60.0
     ) -> tuple[int, str]:
-        """Send a signal; returns exit status and output."""
+        """Send a signal; returns exit status and output, without what it told for information."""
         process.send_signal(number)
         self.processes.remove(process)
         output, hung = _end_of(process, within)
         assert not hung, f"{process.args!r} did not end within {within} s:\n{output}"
-        return process.returncode, output
+        return process.returncode, without_information(output)
 
     def close(self) -> None:
         """End what still runs; a process that has others of its own gets the time to end them.
@@ -179,6 +179,11 @@ class Graph:
         self.processes.clear()
         stuck = [f"{arguments!r} did not end:\n{output}" for arguments, output, hung in ends if hung]
         assert not stuck, "\n".join(stuck)
+
+
+def without_information(output: str) -> str:
+    """A node's output without its log's lines for information: a warning or an error is worth a look."""
+    return "".join(line for line in output.splitlines(keepends=True) if not line.startswith("[INFO] "))
 
 
 def _end_of(process: subprocess.Popen[str], within: float) -> tuple[str, bool]:

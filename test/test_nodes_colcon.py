@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
 
-from node_processes import PATIENCE, ROOT, Graph
+from node_processes import PATIENCE, ROOT, Graph, without_information
 
 COLCON = shutil.which("colcon", path=sysconfig.get_path("scripts") + os.pathsep + os.environ.get("PATH", ""))
 NAMES = (
@@ -64,4 +64,7 @@ def test_every_executable_runs_from_the_install_folder(tmp_path: Path) -> None:
             process.send_signal(signal.SIGINT)
         output, _ = process.communicate(timeout=60.0 * PATIENCE)
         expected = (2, "replay: parameter session: is empty; give the folder of a session\n")
-        assert (name, process.returncode, output) == (name, *(expected if name == "replay" else (0, "")))
+        assert (name, process.returncode, without_information(output)) == (
+            name,
+            *(expected if name == "replay" else (0, "")),
+        )

@@ -14,8 +14,8 @@ from rig_identification.files import nearest_existing
 from rig_identification.nodes.worker_process import WorkerProcess
 
 #: s that an interrupted fit gets to say its best answer until then. It heeds the interrupt between two
-#: compiled calls, which take up to a second; composing and writing an answer takes a few. A busy machine takes
-#: several times as long.
+#: compiled calls, which take up to a second; composing and writing an answer takes a few. A busy machine
+#: takes several times as long.
 PATIENCE = 20.0
 
 

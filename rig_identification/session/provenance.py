@@ -50,7 +50,7 @@ def file_digests(path: Path, progress: Callable[[str], None] | None = None) -> d
 def session_digest(digests: Mapping[str, str]) -> str:
     """SHA-256, in hexadecimal, of a whole session: of the lines that ``sha256sum`` prints for its files.
 
-    digests: of :func:`file_digests`. Two sessions with the same hash hold the same recordings, rig and session
+    digests: of :func:`file_digests`. Sessions with the same hash hold the same recordings, rig and session
     descriptions under the same names.
     """
     lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())

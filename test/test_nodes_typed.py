@@ -1,0 +1,277 @@
+"""The typed interface: the package is built, and a client in another process uses action and services."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
+
+from node_processes import (
+    PATIENCE,
+    ROOT,
+    SIMULATOR,
+    Diagnostics,
+    Graph,
+    Probe,
+    graph_of_the_test,
+    probe_of_the_test,
+)
+from ruamel.yaml import YAML
+
+from rig_identification.cli.main import main
+from rig_identification.nodes.typed import TYPED
+
+__all__ = ["graph_of_the_test", "probe_of_the_test"]
+
+pytestmark = pytest.mark.long
+#: A folder that holds a build already: it saves the minute that a build takes.
+BUILT = "RIG_IDENTIFICATION_INTERFACES"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Prefix of the built interfaces."""
+    if given := os.environ.get(BUILT):
+        return Path(given)
+    pytest.importorskip("ament_package", reason="pip install '.[interfaces]'")
+    for tool in ("cmake", "c++"):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+    prefix = tmp_path_factory.mktemp("interfaces")
+    made = subprocess.run(
+        [str(ROOT / "interfaces" / "build.sh"), str(prefix), sys.executable], capture_output=True, text=True
+    )
+    assert made.returncode == 0, made.stdout + made.stderr
+    assert made.stdout.count("export ") == 3
+    return prefix
+
+
+@pytest.fixture
+def environment(built: Path) -> dict[str, str]:
+    """What build.sh says to export."""
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    added = {
+        "PYTHONPATH": [str(ROOT), str(built / "lib" / version / "site-packages")],
+        "LD_LIBRARY_PATH": [str(built / "lib")],
+        "AMENT_PREFIX_PATH": [str(built)],
+    }
+    return {key: os.pathsep.join([*new, os.environ.get(key, "")]) for key, new in added.items()}
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A car on four cables, two short runs."""
+    out = tmp_path_factory.mktemp("simulated") / "car"
+    short = ["--start", "pulled", "--duration", "6", "--rest", "1"]
+    assert main(["simulate", "--case", "14", *short, "--out", str(out)]) == 0
+    return out
+
+
+class Client:
+    """The client's process and what it told."""
+
+    def __init__(
+        self, graph: Graph, environment: dict[str, str], goal: dict[str, Any], cancel_at: str = ""
+    ) -> None:
+        program = str(Path(__file__).with_name("typed_client.py"))
+        command = [sys.executable, program, "/rig/identifier/identify_inertia", json.dumps(goal), cancel_at]
+        self.process = graph.run(command, **environment)
+        self.events: list[dict[str, Any]] = []
+
+    def until(self, *names: str) -> dict[str, Any]:
+        """Read on to an event of one of these names."""
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            assert line.startswith("{"), line + self.process.stdout.read()
+            self.events.append(json.loads(line))
+            if self.events[-1]["event"] in names:
+                return self.events[-1]
+        raise AssertionError(f"{names} did not come after {self.events[-3:]}")
+
+    def told(self, name: str) -> list[dict[str, Any]]:
+        return [event for event in self.events if event["event"] == name]
+
+
+@pytest.fixture(name="identifier")
+def started(graph: Graph, environment: dict[str, str]) -> subprocess.Popen[str]:
+    return graph.start("identifier", f"spool:={graph.folder / 'windows'}", **environment)
+
+
+def test_a_goal_is_answered_with_progress_and_numbers(
+    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+) -> None:
+    client = Client(graph, environment, {"session": str(session)})
+    result = client.until("result", "gone")
+    assert (result["state"], result["message"], result["verdict"]) == ("succeeded", "", "none")
+    heard = client.told("feedback")
+    fractions = [event["fraction"] for event in heard]
+    assert fractions[-1] == 1.0
+    assert len({event["stage"] for event in heard}) > 4
+    known = [event["mass"] for event in heard if event["mass"] is not None]
+    assert known
+    assert heard[0]["mass"] is None
+    truth = json.loads((session / "truth.json").read_text())
+    assert abs(float(result["mass"]) - truth["mass"]) < 5.0
+    assert abs(known[-1] - truth["mass"]) < 5.0
+    result_file, report_file = map(Path, result["files"])
+    assert json.loads(result_file.read_text())["mass"]["value"] == float(result["mass"])
+    assert report_file.is_file()
+    listed = "".join(
+        f"{d}  {n}\n" for n, d in json.loads(result_file.read_text())["provenance"]["files"].items()
+    )
+    summed = subprocess.run(["sha256sum"], input=listed, capture_output=True, text=True, check=True)
+    assert result["sha256"] == summed.stdout.split()[0]
+    # The same again: at once, with the same files
+    again = Client(graph, environment, {"session": str(session)})
+    begun = time.monotonic()
+    assert again.until("result", "gone")["files"] == result["files"]
+    assert not again.told("feedback")
+    assert time.monotonic() - begun < 10.0 * PATIENCE
+    assert graph.end(identifier) == (0, "")
+
+
+@pytest.mark.parametrize("stage", ["accepted", "digest", "fit", "search"])
+def test_a_goal_can_be_cancelled_at_every_stage(
+    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path, stage: str
+) -> None:
+    client = Client(graph, environment, {"session": str(session)}, stage)
+    client.until("cancelling", "result")
+    begun = time.monotonic()
+    result = client.until("result", "gone")
+    assert result["state"] == "canceled"
+    assert time.monotonic() - begun < 30.0
+    if stage == "search":  # the ideal model is fitted: its numbers are not lost
+        assert result["interrupted"]
+        assert float(result["mass"]) > 0.0
+        assert Path(result["files"][0]).is_file()
+    elif stage in ("accepted", "digest"):
+        assert "cancelled before there was an answer" in result["message"]
+        assert result["mass"] == "nan"
+    children = Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children").read_text().split()
+    assert not children
+    assert graph.end(identifier)[0] == 0
+
+
+def test_a_second_goal_is_told_what_runs(
+    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+) -> None:
+    first = Client(graph, environment, {"session": str(session)})
+    first.until("feedback")
+    refused = Client(graph, environment, {"session": str(session)}).until("result", "gone")
+    assert refused["state"] == "aborted"
+    assert refused["message"].startswith("busy: identify_inertia, run 1, is ")
+    first.process.kill()  # a client that dies harms no one
+    for goal, words in (
+        ({"session": str(graph.folder / "none")}, "none"),
+        ({"session": str(session), "work": -1.0}, "give units of work above 0"),
+        ({}, "no window is complete"),
+    ):
+        graph_free = Client(graph, environment, goal)
+        told = graph_free.until("result", "gone")
+        assert told["state"] == "aborted"
+        assert words in told["message"] or told["message"].startswith("busy"), told
+    assert graph.end(identifier)[0] == 0
+
+
+def test_a_killed_identifier_is_noticed_and_a_new_one_answers(
+    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+) -> None:
+    client = Client(graph, environment, {"session": str(session)})
+    client.until("feedback")
+    (child,) = Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children").read_text().split()
+    identifier.send_signal(signal.SIGKILL)
+    identifier.wait()
+    graph.processes.remove(identifier)
+    assert client.until("gone", "result")["event"] == "gone"
+    end = time.monotonic() + 10.0 * PATIENCE
+    while Path(f"/proc/{child}").exists():  # the fit outlives no node
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    anew = graph.start("identifier", f"spool:={graph.folder / 'windows'}", **environment)
+    cancelled = Client(graph, environment, {"session": str(session)}, "accepted")
+    assert cancelled.until("result", "gone")["state"] == "canceled"
+    assert graph.end(anew)[0] == 0
+
+
+SERVICES = """
+import json, sys, time
+import rclpy
+from rig_identification_interfaces.srv import Check, GetCenterOfMass, GetInertia, StartWindow, StopWindow
+
+rclpy.init()
+node = rclpy.create_node("operator")
+
+def ask(kind, name, **fields):
+    client = node.create_client(kind, f"/rig/identifier/typed/{name}")
+    assert client.wait_for_service(120.0), name
+    time.sleep(0.5)
+    future = client.call_async(kind.Request(**fields))
+    rclpy.spin_until_future_complete(node, future, timeout_sec=120.0)
+    answer = future.result()
+    return {field: getattr(answer, field) for field in answer.get_fields_and_field_types()}
+
+def tell(name, answer):
+    print(json.dumps({"name": name, **answer}, default=str), flush=True)
+
+tell("early", ask(GetInertia, "get_inertia"))
+tell("early_com", ask(GetCenterOfMass, "get_center_of_mass"))
+tell("wrong", ask(StartWindow, "start_window", kind="swinging"))
+tell("odd", ask(StartWindow, "start_window", kind="static", holdout=True))
+tell("heavy", ask(StartWindow, "start_window", kind="dynamic", dummy_mass=5.0))
+tell("started", ask(StartWindow, "start_window", kind="static", dummy_mass=5.0))
+time.sleep(float(sys.argv[2]))
+tell("stopped", ask(StopWindow, "stop_window"))
+for session in sys.argv[3:]:
+    checked = ask(Check, "check", session=session)
+    checked["faults"] = [[f.effect, f.statement, f.channel] for f in checked["faults"]]
+    tell("checked", checked)
+"""
+
+
+def test_services_take_and_give_typed_values(
+    graph: Graph, probe: Probe, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+) -> None:
+    graph.start("rig_simulator", *SIMULATOR)
+    graph.start("load_cells", "simulation.rate:=100.0")
+    turned = graph.folder / "turned"
+    shutil.copytree(session, turned)
+    rig = (turned / "rig.yaml").read_text()
+    document = YAML(typ="safe").load(rig)
+    document["/**"]["ros__parameters"]["imu"]["orientation"] = [0.0, 0.0, 1.0, 0.0]  # half a turn about z
+    with (turned / "rig.yaml").open("w") as stream:
+        YAML(typ="safe", pure=True).dump(document, stream)
+    diagnostics = Diagnostics(probe)
+    probe.spin_until(diagnostics.arrivals("identifier", 1, "cable_1/wrench"), 120.0, "the load cells")
+    assert diagnostics.says("identifier: interface", TYPED)
+    asking = graph.run(
+        [sys.executable, "-c", SERVICES, "-", "3", str(session), str(turned), "nowhere"], **environment
+    )
+    output, _ = asking.communicate(timeout=240.0 * PATIENCE)
+    told = [json.loads(line) for line in output.splitlines()]
+    by_name = {line["name"]: line for line in told}
+    assert not by_name["early"]["success"]
+    assert "nothing was identified" in by_name["early"]["message"]
+    assert not by_name["early_com"]["success"]
+    assert "give static or dynamic" in by_name["wrong"]["message"]
+    assert "cannot be held out" in by_name["odd"]["message"]
+    assert "dummy belongs to a static" in by_name["heavy"]["message"]
+    assert by_name["started"]["success"]
+    assert by_name["stopped"]["success"], by_name["stopped"]
+    checks = [line for line in told if line["name"] == "checked"]
+    assert [line["success"] for line in checks] == [True, True, False]
+    assert "True" in str(checks[0]["sound"])
+    assert checks[1]["faults"][0][2] == "imu"
+    assert "nowhere" in checks[2]["message"]
+    (entry,) = YAML(typ="safe").load((graph.folder / "windows" / "session.yaml").read_text())["recordings"]
+    assert entry["dummy"]["mass"] == 5.0
+    assert graph.end(identifier)[0] == 0
