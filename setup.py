@@ -75,6 +75,22 @@ setup(
             f"ros-jazzy-common-interfaces{ROS_WHEELS}",
             "pyserial>=3.5",
         ],
+        # What cmake needs for interfaces/ against the wheels, which do not name one another.
+        "interfaces": [
+            f"ros-jazzy-{name}{ROS_WHEELS}"
+            for name in (
+                "ament-cmake",
+                "ament-cmake-gmock",
+                "ament-cmake-gtest",
+                "ament-cmake-include-directories",
+                "ament-cmake-pytest",
+                "ament-cmake-ros",
+                "ament-package",
+                "python-cmake-module",
+                "rosidl-core-generators",
+                "rosidl-default-generators",
+            )
+        ],
         "pandas": ["pandas>=2.0"],
         "mat": ["pymatreader>=1.0"],
         "mdf": ["asammdf>=8.0"],

@@ -13,7 +13,10 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
-from rig_identification.session import write_session
+from rig_identification.report import result_to_dict
+from rig_identification.result import Identification
+from rig_identification.search.identify import identify
+from rig_identification.session import read_session, write_session
 from rig_identification.simulate import simulate_session
 
 #: The command as it is, which says each stage aloud and waits there, as a long one would, for the signal.
@@ -80,3 +83,15 @@ def test_before_the_ideal_model_is_fitted_nothing_is_written(session: Path, tmp_
     assert done.stderr.splitlines() == ["rig-identification: interrupted"]
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
     assert earlier.read_text() == "earlier"
+
+
+def test_whoever_watches_changes_nothing(session: Path) -> None:
+    """Each better answer is shown while the search runs; the last answer is the same to the last digit."""
+    recorded = read_session(session)
+    seen: list[Identification] = []
+    alone = identify(recorded, work=3.0)
+    watched = identify(recorded, work=3.0, watcher=seen.append)
+    assert result_to_dict(watched) == result_to_dict(alone)
+    assert len(seen) > 1
+    assert all(np.isfinite(answer.total.values).all() for answer in seen)
+    assert not any(answer.interrupted for answer in seen)

@@ -18,6 +18,7 @@ from rig_identification.nodes.markers import rig_markers
 from rig_identification.nodes.odometry_wire import OdometryWriter
 from rig_identification.nodes.parameters import OwnParameter, within
 from rig_identification.nodes.rig_node import ERROR, OK, WARN, RigNode, diagnostic, reliable
+from rig_identification.nodes.transforms import Transforms
 from rig_identification.topics import expected_topics
 
 PARAMETERS = (
@@ -25,6 +26,7 @@ PARAMETERS = (
     OwnParameter("period", 0.004, "s between looks at what arrived", within(0.001, 0.1, "s")),
     OwnParameter("depth", 2000, "messages kept of each topic: seconds of the fastest", within(10, 100_000)),
     OwnParameter("marker_rate", 10.0, "Hz of the markers; 0: none", within(0.0, 60.0, "Hz")),
+    OwnParameter("tf_rate", 50.0, "Hz of the body's transform on /tf; 0: none", within(0.0, 200.0, "Hz")),
 )
 #: Forces change the track slowly: they are looked at once in so many times.
 FORCES_EVERY = 5
@@ -58,6 +60,9 @@ class TrackerNode(RigNode):
         self._found_anew = 0  # times, by the last look
         self.tracked = self.late = 0  # samples since the start; those whose odometry came later than LATE
         self.every(self.own.number("period"), self._work)
+        self._transforms = Transforms(self, self._description)
+        if self.own.number("tf_rate") > 0.0:
+            self.every(1.0 / self.own.number("tf_rate"), lambda: self._transforms.publish(self._latest))
         if self.own.number("marker_rate") > 0.0:
             self.every(1.0 / self.own.number("marker_rate"), self._draw)
 
@@ -117,7 +122,8 @@ class TrackerNode(RigNode):
                 tracked=self.tracked, late=self.late, restarts=self.tracker.restarts,
                 surprises=self.tracker.surprises,
             )  # fmt: skip
-        return [*super().status(), line]
+        frames = diagnostic(f"{self.get_name()}: frames", OK, self._transforms.told)
+        return [*super().status(), line, frames]
 
     def _imu_topic(self) -> str:
         return next(name for name, topic in self.intake.topics.items() if topic.channel == "imu")

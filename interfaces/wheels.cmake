@@ -1,0 +1,15 @@
+# The wheels of the package index name the Python headers of the machine that built them. CMake refuses a folder
+# that is not there; the headers of this machine's Python are found anyway.
+foreach(name action_msgs builtin_interfaces geometry_msgs service_msgs std_msgs unique_identifier_msgs)
+  set(target ${name}::${name}__rosidl_generator_py)
+  if(TARGET ${target})
+    get_target_property(folders ${target} INTERFACE_INCLUDE_DIRECTORIES)
+    set(there "")
+    foreach(folder IN LISTS folders)
+      if(NOT IS_ABSOLUTE "${folder}" OR EXISTS "${folder}")
+        list(APPEND there "${folder}")
+      endif()
+    endforeach()
+    set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${there}")
+  endif()
+endforeach()
