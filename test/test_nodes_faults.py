@@ -259,7 +259,7 @@ def test_a_node_started_twice_and_one_started_late_are_named(graph: Graph, probe
     probe.spin_until(
         lambda: diagnostics.says("identifier: /rig/imu/data_raw", "2 publishers"), 20.0, "the word"
     )
-    probe.spin_until(lambda: diagnostics.says("/rig/imu", "two nodes of this name"), 10.0, "the nodes' word")
+    probe.spin_until(lambda: diagnostics.says("imu: node", "two nodes of this name"), 10.0, "the nodes' word")
     assert graph.end(late) == (0, "")
 
 

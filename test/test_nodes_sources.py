@@ -130,7 +130,7 @@ def test_a_parameter_set_while_running_is_checked(graph: Graph, probe: Probe) ->
     (reason,) = probe.set("recorder", recording__kind="dynmic")
     assert reason == "recording.kind: 'dynmic' is unknown; give static or dynamic"
     (reason,) = probe.set("recorder", storage="sqlite3")
-    assert reason == "storage is read when the node starts"
+    assert reason == "Trying to set a read-only parameter: storage."
     assert probe.set("recorder", recording__kind="static", recording__dummy_mass=50) == []
     assert graph.end(recorder) == (0, "")
 

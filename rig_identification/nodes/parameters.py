@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -30,27 +30,63 @@ class OwnParameter:
     settable: bool = False  # while the node runs
 
 
-def within(low: float, high: float, unit: str = "") -> Check:
+@dataclass(frozen=True)
+class Within:
     """Check for a number, or each of a list, from ``low`` to ``high``."""
 
-    def check(value: Value) -> None:
+    low: float
+    high: float
+    unit: str = ""
+
+    def __call__(self, value: Value) -> None:
+        """Raise ValueError for a number outside."""
         for number in value if isinstance(value, list) else [value]:
-            if not (isinstance(number, int | float) and low <= number <= high):
-                raise ValueError(
-                    f"{number} {unit} is not within {low:g} and {high:g} {unit}".replace("  ", " ")
-                )
-
-    return check
+            if not (isinstance(number, int | float) and self.low <= number <= self.high):
+                told = f"{number} {self.unit} is not within {self.low:g} and {self.high:g} {self.unit}"
+                raise ValueError(told.replace("  ", " "))
 
 
-def one_of(*words: str) -> Check:
+def within(low: float, high: float, unit: str = "") -> Within:
+    """Check for a number, or each of a list, from ``low`` to ``high``."""
+    return Within(float(low), float(high), unit)
+
+
+@dataclass(frozen=True)
+class OneOf:
     """Check for one of ``words``."""
 
-    def check(value: Value) -> None:
-        if value not in words:
-            raise ValueError(f"{value!r} is unknown; give {' or '.join(words)}")
+    words: tuple[str, ...]
 
-    return check
+    def __call__(self, value: Value) -> None:
+        """Raise ValueError for another word."""
+        if value not in self.words:
+            raise ValueError(f"{value!r} is unknown; give {' or '.join(self.words)}")
+
+
+def one_of(*words: str) -> OneOf:
+    """Check for one of ``words``."""
+    return OneOf(words)
+
+
+def described(p: OwnParameter) -> ParameterDescriptor:
+    """What ``ros2 param describe`` and rqt show: meaning, range or words, and whether it may be set.
+
+    ROS 2 has ranges for single numbers alone; those of a list stand in the constraints' text.
+    """
+    descriptor = ParameterDescriptor(
+        name=p.name, description=p.description, dynamic_typing=True, read_only=not p.settable
+    )
+    if isinstance(p.check, OneOf):
+        descriptor.additional_constraints = f"one of {', '.join(p.check.words)}"
+    elif isinstance(p.check, Within):
+        low, high, unit = p.check.low, p.check.high, p.check.unit
+        if type(p.default) is int:
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+        elif type(p.default) is float:
+            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+        else:
+            descriptor.additional_constraints = f"each number within {low:g} and {high:g} {unit}".rstrip()
+    return descriptor
 
 
 def _plain(value: object) -> Value:
@@ -99,18 +135,17 @@ class OwnParameters:
         self._known = {p.name: p for p in parameters}
         self.values: dict[str, Value] = {}
         for p in parameters:
-            descriptor = ParameterDescriptor(
-                name=p.name, description=p.description, dynamic_typing=True, read_only=False
-            )
+            descriptor = described(p)
             if node.has_parameter(p.name):
+                # Checked first: what is refused is refused in the same words as a file's
+                self.values[p.name] = self._checked(p, node.get_parameter(p.name).value)
                 node.set_descriptor(p.name, descriptor)
-                given = node.get_parameter(p.name).value
             else:
                 # rclpy cannot tell the type of an empty list: such a default stays undeclared in type
-                given = node.declare_parameter(
-                    p.name, p.default if p.default != [] else [""], descriptor
-                ).value
-            self.values[p.name] = self._checked(p, given)
+                default = p.default if p.default != [] else [""]
+                self.values[p.name] = self._checked(
+                    p, node.declare_parameter(p.name, default, descriptor).value
+                )
         node.add_on_set_parameters_callback(self._on_set)
 
     def _checked(self, p: OwnParameter, given: object) -> Value:
@@ -124,8 +159,6 @@ class OwnParameters:
         for change in changes:
             if (p := self._known.get(change.name)) is None:
                 continue
-            if not p.settable:
-                return SetParametersResult(successful=False, reason=f"{p.name} is read when the node starts")
             try:
                 accepted[p.name] = check_value(p, change.value)
             except ValueError as error:

@@ -139,7 +139,7 @@ class RigNode(Node):
         names = self.get_node_names_and_namespaces()
         if names.count((self.get_name(), self.get_namespace())) > 1:
             level, message = ERROR, "two nodes of this name run: end one, or rename it"
-        return [diagnostic(self.get_fully_qualified_name(), level, message)]
+        return [diagnostic(f"{self.get_name()}: node", level, message)]
 
     def _diagnose(self) -> None:
         array = DiagnosticArray(status=self.status())
