@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return prefix
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def environment(built: Path) -> dict[str, str]:
     """What build.sh says to export."""
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
@@ -107,16 +108,32 @@ class Client:
         return [event for event in self.events if event["event"] == name]
 
 
-@pytest.fixture(name="identifier")
-def started(graph: Graph, environment: dict[str, str]) -> subprocess.Popen[str]:
+@pytest.fixture(name="shared", scope="module")
+def shared_by_the_tests(
+    tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]
+) -> Iterator[Graph]:
+    """A graph with an identifier that several tests ask, one after the other."""
+    graph = Graph(tmp_path_factory.mktemp("graph"))
+    identifier = start_identifier(graph, environment)
+    yield graph
+    assert graph.end(identifier) == (0, "")
+    graph.close()
+
+
+def start_identifier(graph: Graph, environment: dict[str, str]) -> subprocess.Popen[str]:
     return graph.start("identifier", f"spool:={graph.folder / 'windows'}", **environment)
 
 
+def fits_of(identifier: subprocess.Popen[str]) -> list[str]:
+    """Processes of an identifier's own."""
+    return Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children").read_text().split()
+
+
 def test_a_goal_is_answered_with_progress_and_numbers(
-    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+    shared: Graph, environment: dict[str, str], session: Path
 ) -> None:
     goal = {"session": str(session), "work": 3.0}
-    client = Client(graph, environment, goal)
+    client = Client(shared, environment, goal)
     result = client.until("result", "gone")
     assert (result["state"], result["message"], result["interrupted"]) == ("succeeded", "", False)
     heard = client.told("feedback")
@@ -138,19 +155,18 @@ def test_a_goal_is_answered_with_progress_and_numbers(
     summed = subprocess.run(["sha256sum"], input=listed, capture_output=True, text=True, check=True)
     assert result["sha256"] == summed.stdout.split()[0]
     # The same again: at once, with the same files
-    again = Client(graph, environment, goal)
+    again = Client(shared, environment, goal)
     begun = time.monotonic()
     assert again.until("result", "gone")["files"] == result["files"]
     assert not again.told("feedback")
     assert time.monotonic() - begun < 10.0 * PATIENCE
-    assert graph.end(identifier) == (0, "")
 
 
-@pytest.mark.parametrize("stage", ["accepted", "digest", "fit", "search"])
+@pytest.mark.parametrize("stage", ["accepted", "reading", "fit", "search"])
 def test_a_goal_can_be_cancelled_at_every_stage(
-    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path, stage: str
+    shared: Graph, environment: dict[str, str], session: Path, stage: str
 ) -> None:
-    client = Client(graph, environment, {"session": str(session)}, stage)
+    client = Client(shared, environment, {"session": str(session)}, stage)
     client.until("cancelling", "result")
     begun = time.monotonic()
     result = client.until("result", "gone")
@@ -160,41 +176,49 @@ def test_a_goal_can_be_cancelled_at_every_stage(
         assert result["interrupted"]
         assert float(result["mass"]) > 0.0
         assert Path(result["files"][0]).is_file()
-    elif stage in ("accepted", "digest"):
+    elif stage in ("accepted", "reading"):
         assert "cancelled before there was an answer" in result["message"]
         assert result["mass"] == "nan"
-    children = Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children").read_text().split()
-    assert not children
-    assert graph.end(identifier)[0] == 0
+    assert not fits_of(shared.processes[0])
 
 
-def test_a_second_goal_is_told_what_runs(
-    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+def test_a_goal_that_cannot_be_met_is_told_why(
+    shared: Graph, environment: dict[str, str], session: Path
 ) -> None:
-    first = Client(graph, environment, {"session": str(session)})
-    first.until("feedback")
-    refused = Client(graph, environment, {"session": str(session)}).until("result", "gone")
-    assert refused["state"] == "aborted"
-    assert refused["message"].startswith("busy: identify_inertia, run 1, is ")
-    first.process.kill()  # a client that dies harms no one
     for goal, words in (
-        ({"session": str(graph.folder / "none")}, "none"),
+        ({"session": str(shared.folder / "none")}, "none"),
         ({"session": str(session), "work": -1.0}, "give units of work above 0"),
+        ({"session": str(session), "windows": ["run_1"]}, "a session is taken whole"),
         ({}, "no window is complete"),
     ):
-        graph_free = Client(graph, environment, goal)
-        told = graph_free.until("result", "gone")
+        told = Client(shared, environment, goal).until("result", "gone")
         assert told["state"] == "aborted"
-        assert words in told["message"] or told["message"].startswith("busy"), told
-    assert graph.end(identifier)[0] == 0
+        assert words in told["message"], told
+
+
+def test_a_second_goal_is_told_what_runs_and_a_trigger_ends_the_first(
+    shared: Graph, environment: dict[str, str], session: Path
+) -> None:
+    first = Client(shared, environment, {"session": str(session)})
+    first.until("feedback")
+    refused = Client(shared, environment, {"session": str(session)}).until("result", "gone")
+    assert refused["state"] == "aborted"
+    assert re.match(r"busy: identify_inertia, run \d+, is \d+ % done \(.+\)", refused["message"]), refused
+    probe = Probe(shared)
+    assert probe.call("identifier/cancel").success
+    probe.close()
+    ended = first.until("result", "gone")
+    assert ended["state"] == "aborted"
+    assert ended["message"].endswith("was cancelled")
 
 
 def test_a_killed_identifier_is_noticed_and_a_new_one_answers(
-    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+    graph: Graph, environment: dict[str, str], session: Path
 ) -> None:
+    identifier = start_identifier(graph, environment)
     client = Client(graph, environment, {"session": str(session)})
     client.until("feedback")
-    (child,) = Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children").read_text().split()
+    (child,) = fits_of(identifier)
     identifier.send_signal(signal.SIGKILL)
     identifier.wait()
     graph.processes.remove(identifier)
@@ -203,7 +227,7 @@ def test_a_killed_identifier_is_noticed_and_a_new_one_answers(
     while Path(f"/proc/{child}").exists():  # the fit outlives no node
         assert time.monotonic() < end
         time.sleep(0.05)
-    anew = graph.start("identifier", f"spool:={graph.folder / 'windows'}", **environment)
+    anew = start_identifier(graph, environment)
     cancelled = Client(graph, environment, {"session": str(session)}, "accepted")
     assert cancelled.until("result", "gone")["state"] == "canceled"
     assert graph.end(anew)[0] == 0
@@ -245,8 +269,9 @@ for session in sys.argv[3:]:
 
 
 def test_services_take_and_give_typed_values(
-    graph: Graph, probe: Probe, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+    graph: Graph, probe: Probe, environment: dict[str, str], session: Path
 ) -> None:
+    identifier = start_identifier(graph, environment)
     graph.start("rig_simulator", *SIMULATOR)
     graph.start("load_cells", "simulation.rate:=100.0")
     turned = graph.folder / "turned"
@@ -342,16 +367,15 @@ def test_frames_come_by_tf(graph: Graph, environment: dict[str, str]) -> None:
 
 
 def test_the_program_of_the_documentation_runs(
-    graph: Graph, identifier: subprocess.Popen[str], environment: dict[str, str], session: Path
+    shared: Graph, environment: dict[str, str], session: Path
 ) -> None:
     page = (ROOT / "docs" / "how-to" / "typed-interface.md").read_text(encoding="utf-8")
     (program,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert program.count('session="/data/car"') == 1
-    program = program.replace('session="/data/car"', f"session={str(session)!r}, work=3.0")
-    running = graph.run([sys.executable, "-c", program], **environment)
+    program = program.replace('session="/data/car"', f"session={str(session)!r}, work=2.0")
+    running = shared.run([sys.executable, "-c", program], **environment)
     output, _ = running.communicate(timeout=300.0)
     assert running.returncode == 0, output
     *progress, last = output.splitlines()
     assert re.fullmatch(r"(none|explained|unexplained): \d+\.\d\d kg, report .*/report\.html", last), output
     assert any("mass so far nan" not in line for line in progress)
-    assert graph.end(identifier) == (0, "")
