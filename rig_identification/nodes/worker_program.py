@@ -30,8 +30,9 @@ class Voice:
     def say(self, kind: str, **content: object) -> None:
         """Write a line. Raises KeyboardInterrupt, after it, where SIGINT came meanwhile."""
         text = json.dumps({"kind": kind, **content}, allow_nan=False)
-        main = threading.current_thread() is threading.main_thread()
-        self._speaking = main  # only there are signals heeded
+        main = threading.current_thread() is threading.main_thread()  # signals are heeded there alone
+        if main:
+            self._speaking = True
         try:
             with self._lock:
                 print(text, flush=True)
