@@ -129,6 +129,15 @@ def fits_of(identifier: subprocess.Popen[str]) -> list[str]:
     return Path(f"/proc/{identifier.pid}/task/{identifier.pid}/children").read_text().split()
 
 
+def runs(process: str) -> bool:
+    """Whether a process is there; one that has ended may wait for its parent to notice."""
+    try:
+        status = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
+    return status.rpartition(")")[2].split()[0] != "Z"
+
+
 def test_a_goal_is_answered_with_progress_and_numbers(
     shared: Graph, environment: dict[str, str], session: Path
 ) -> None:
@@ -224,7 +233,7 @@ def test_a_killed_identifier_is_noticed_and_a_new_one_answers(
     graph.processes.remove(identifier)
     assert client.until("gone", "result")["event"] == "gone"
     end = time.monotonic() + 10.0 * PATIENCE
-    while Path(f"/proc/{child}").exists():  # the fit outlives no node
+    while runs(child):  # the fit outlives no node
         assert time.monotonic() < end
         time.sleep(0.05)
     anew = start_identifier(graph, environment)
@@ -251,7 +260,8 @@ def ask(kind, name, **fields):
     return {field: getattr(answer, field) for field in answer.get_fields_and_field_types()}
 
 def tell(name, answer):
-    print(json.dumps({"name": name, **answer}, default=str), flush=True)
+    answer["window"] = answer.get("name")
+    print(json.dumps({**answer, "name": name}, default=str), flush=True)
 
 tell("early", ask(GetInertia, "get_inertia"))
 tell("early_com", ask(GetCenterOfMass, "get_center_of_mass"))
@@ -296,8 +306,12 @@ def test_services_take_and_give_typed_values(
     assert "give static or dynamic" in by_name["wrong"]["message"]
     assert "cannot be held out" in by_name["odd"]["message"]
     assert "dummy belongs to a static" in by_name["heavy"]["message"]
-    assert by_name["started"]["success"]
-    assert by_name["stopped"]["success"], by_name["stopped"]
+    assert (by_name["started"]["success"], by_name["started"]["window"]) == (True, "static_1")
+    assert (by_name["stopped"]["success"], by_name["stopped"]["window"]) == (True, "static_1")
+    counts = dict(zip(by_name["stopped"]["topics"], by_name["stopped"]["messages"], strict=True))
+    assert {f"/rig/cable_{i}/wrench" for i in range(1, 5)} <= set(counts)
+    assert min(counts.values()) > 50
+    assert by_name["stopped"]["silent"] == []
     checks = [line for line in told if line["name"] == "checked"]
     assert [line["success"] for line in checks] == [True, True, False]
     assert "True" in str(checks[0]["sound"])

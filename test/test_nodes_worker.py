@@ -35,33 +35,33 @@ run(work)
 """
 
 
+def started(*manner: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-c", PROGRAM, *manner]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+
 @pytest.mark.parametrize("manner", ["talks", "works"])
 @pytest.mark.parametrize("best", ["some", "none"])
 def test_an_interrupt_never_tears_a_line(manner: str, best: str) -> None:
-    for delay in (0.0, 0.005, 0.02):
-        process = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, manner, best], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
+    with started(manner, best) as process:
         assert process.stdout is not None
         assert json.loads(process.stdout.readline())["stage"] == "reading"
-        time.sleep(delay)
+        time.sleep(0.005)
         process.send_signal(signal.SIGINT)
         process.send_signal(signal.SIGINT)  # a second one changes nothing
         lines = [json.loads(line) for line in process.stdout]
         assert process.wait(timeout=60.0) == 0
-        assert lines[-1]["kind"] == ("cancelled" if best == "none" else "result")
-        assert {line["kind"] for line in lines[:-1]} <= {"progress"}
+    assert lines[-1]["kind"] == ("cancelled" if best == "none" else "result")
+    assert {line["kind"] for line in lines[:-1]} <= {"progress"}
 
 
 def test_a_program_ends_with_its_node() -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, "works", "some"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    assert process.stdout is not None
-    assert process.stdin is not None
-    process.stdout.readline()
-    process.stdin.close()
-    assert process.wait(timeout=60.0) == 1
+    with started("works", "some") as process:
+        assert process.stdout is not None
+        assert process.stdin is not None
+        process.stdout.readline()
+        process.stdin.close()
+        assert process.wait(timeout=60.0) == 1
 
 
 def wait_for(process: WorkerProcess) -> None:
