@@ -229,7 +229,7 @@ def test_a_killed_identifier_is_noticed_and_a_new_one_answers(
     client.until("feedback")
     (child,) = fits_of(identifier)
     identifier.send_signal(signal.SIGKILL)
-    identifier.wait()
+    identifier.communicate()
     graph.processes.remove(identifier)
     assert client.until("gone", "result")["event"] == "gone"
     end = time.monotonic() + 10.0 * PATIENCE
@@ -250,14 +250,15 @@ from rig_identification_interfaces.srv import Check, GetCenterOfMass, GetInertia
 rclpy.init()
 node = rclpy.create_node("operator")
 
-def ask(kind, name, **fields):
+def ask(kind, name, /, **fields):
     client = node.create_client(kind, f"/rig/identifier/typed/{name}")
     assert client.wait_for_service(120.0), name
     time.sleep(0.5)
     future = client.call_async(kind.Request(**fields))
     rclpy.spin_until_future_complete(node, future, timeout_sec=120.0)
     answer = future.result()
-    return {field: getattr(answer, field) for field in answer.get_fields_and_field_types()}
+    values = {field: getattr(answer, field) for field in answer.get_fields_and_field_types()}
+    return {field: v.tolist() if hasattr(v, "tolist") else v for field, v in values.items()}
 
 def tell(name, answer):
     answer["window"] = answer.get("name")
@@ -298,6 +299,7 @@ def test_services_take_and_give_typed_values(
         [sys.executable, "-c", SERVICES, "-", "3", str(session), str(turned), "nowhere"], **environment
     )
     output, _ = asking.communicate(timeout=240.0 * PATIENCE)
+    assert asking.returncode == 0, output
     told = [json.loads(line) for line in output.splitlines()]
     by_name = {line["name"]: line for line in told}
     assert not by_name["early"]["success"]
