@@ -86,12 +86,12 @@ def test_before_the_ideal_model_is_fitted_nothing_is_written(session: Path, tmp_
 
 
 def test_whoever_watches_changes_nothing(session: Path) -> None:
-    """Each better answer is shown while the search runs; the last answer is the same to the last digit."""
+    """Answers are shown while the search runs; the last answer is the same to the last digit."""
     recorded = read_session(session)
     seen: list[Identification] = []
     alone = identify(recorded, work=3.0)
     watched = identify(recorded, work=3.0, watcher=seen.append)
     assert result_to_dict(watched) == result_to_dict(alone)
-    assert len(seen) > 1
+    assert seen  # the ideal model's answer at least, then whatever is found
     assert all(np.isfinite(answer.total.values).all() for answer in seen)
     assert not any(answer.interrupted for answer in seen)
