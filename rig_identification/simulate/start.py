@@ -1,4 +1,4 @@
-"""How a run starts: hanging at rest, pulled aside and let go, or let go in a given pose."""
+"""How a run starts: hanging at rest, pulled aside and let go, or let go in a given pose or beside rest."""
 
 from __future__ import annotations
 
@@ -41,7 +41,15 @@ class Posed:
     orientation: Array  # (4,) quaternion xyzw, rotates body vectors into world
 
 
-Start = AtRest | Pulled | Posed
+@dataclass(frozen=True)
+class Displaced:
+    """The body is let go off its rest pose, in the nearest pose that the cables allow."""
+
+    shift: Array  # (3,) m, of the body datum in world
+    turn: Array  # (3,) rad, about world x, then y, then z, through the body datum
+
+
+Start = AtRest | Pulled | Posed | Displaced
 
 
 def rest_state(model: RigModel) -> State:
@@ -64,8 +72,7 @@ def start_state(model: RigModel, start: Start, rest: State) -> State:
         return rest
     if isinstance(start, Pulled):
         return _pulled_aside(model, start, rest)
-    R = Rotation.from_quat(start.orientation).as_matrix()
-    given = State(np.array(start.position, dtype=float), R, np.zeros(3), np.zeros(3))
+    given = _displaced(start, rest) if isinstance(start, Displaced) else _posed(start)
     state = on_cables(model, given)
     moved = float(np.linalg.norm(state.position - given.position))
     if not moved < FURTHEST:
@@ -73,6 +80,16 @@ def start_state(model: RigModel, start: Start, rest: State) -> State:
             f"start: the nearest pose on the cables is {moved:.3g} m away from the given one; check it"
         )
     return state
+
+
+def _posed(start: Posed) -> State:
+    R = Rotation.from_quat(start.orientation).as_matrix()
+    return State(np.array(start.position, dtype=float), R, np.zeros(3), np.zeros(3))
+
+
+def _displaced(start: Displaced, rest: State) -> State:
+    R = Rotation.from_euler("xyz", start.turn).as_matrix() @ rest.R_world_body
+    return State(rest.position + start.shift, R, np.zeros(3), np.zeros(3))
 
 
 def _pulled_aside(model: RigModel, pull: Pulled, rest: State) -> State:
