@@ -36,7 +36,7 @@ def center_of_mass(rig: Rig, readings: Mapping[str, Any]) -> Balance:
     rig : Rig
         Hinges and tolerances.
     readings : mapping
-        ``mass`` (kg, of all but the known mass), ``lengths`` (m, by cable) and ``rest``, a list of recordings:
+        ``mass`` (kg, of all but the known mass), ``lengths`` (m, by cable), ``rest``, a list of recordings:
         ``name``, ``inclination_deg`` (two, of the inclinometer's x and y axis above the horizontal plane),
         ``inclination_std_deg``, and where there are such ``tension`` and ``tension_std`` (N, by cable) and
         ``dummy``: ``mass`` (kg) and ``position`` (m, body) of the known mass.

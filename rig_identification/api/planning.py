@@ -67,9 +67,7 @@ class Planned:
         path.write_bytes(self.described)
 
 
-def plan_session(
-    rig: str | Path, body: Array, means: Means, *, progress: Progress | None = None
-) -> Planned:
+def plan_session(rig: str | Path, body: Array, means: Means, *, progress: Progress | None = None) -> Planned:
     """Plan a session on the rig of a description.
 
     body: (10,) what the plan is for, see :func:`boxed` and :func:`given_body`. means: see :func:`means_of`.
@@ -129,8 +127,8 @@ def means_of(
 ) -> Means:
     """What there is to record with.
 
-    amounts: of :data:`LIMITS`, as the fields of ``plan.Means``. without: devices that do not record. mocap: Hz,
-    0: none. changeover: s. Raises ArgumentError for a number that makes no sense.
+    amounts: of :data:`LIMITS`, as the fields of ``plan.Means``. without: devices that do not record.
+    mocap: Hz, 0: none. changeover: s. Raises ArgumentError for a number that makes no sense.
     """
     from rig_identification.plan import Means
     from rig_identification.simulate import SampleRates

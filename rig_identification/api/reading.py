@@ -158,7 +158,7 @@ def _account(recording: str, channel: RawChannel) -> dict[str, Any]:
 
 
 def named_files(session: str | Path) -> tuple[Path, ...]:
-    """Every file and folder that a session's description names, and what lies in its bags. Raises InputError."""
+    """All that a session's description names, and what lies in its bags. Raises InputError."""
     from rig_identification.errors import MissingDescription
     from rig_identification.session.provenance import files_at
     from rig_identification.session.session_description import read_session_description

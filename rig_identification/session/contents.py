@@ -17,8 +17,8 @@ from rig_identification.session.unpacking import ZSTD_MAGIC, Damaged, unpacked_m
 _CDR, _ROS1 = ("cdr", ""), "ros1"
 #: Topics of one bag. A graph of robots has hundreds; each costs memory in every table of the bag.
 MOST_TOPICS = 10_000
-#: Bytes of kept messages that any bag may have, and beyond them how many for each byte of its files: a message
-#: that repeats itself but for its stamps packs thirty to one.
+#: Bytes of kept messages that any bag may have, and beyond them how many for each byte of its files: messages
+#: that repeat themselves but for their stamps pack thirty to one.
 _ALWAYS_KEPT, _KEPT_RATIO = 1 << 27, 40
 _TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -58,7 +58,9 @@ class Contents:
             A topic of two types, or more topics than a bag has.
         """
         if len(self.listed) >= MOST_TOPICS and topic not in self.listed:
-            raise InputError(f"{self._where}: names more than {MOST_TOPICS} topics; record the rig's own alone")
+            raise InputError(
+                f"{self._where}: names more than {MOST_TOPICS} topics; record the rig's own alone"
+            )
         kind = _ros2_name(message_type)
         if self.listed.setdefault(topic, kind) != kind:
             raise InputError(f"{self._where}: {topic}: recorded with two types; keep one publisher")

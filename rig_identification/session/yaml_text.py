@@ -1,6 +1,6 @@
-"""YAML of a description, read within limits: whatever the text holds, it costs seconds and megabytes at most.
+"""YAML of a description, read within limits: whatever the text holds, it costs seconds and megabytes.
 
-The pure loader reads some thousands of nodes a second. An alias stands for all that its anchor holds, so a few
+The pure loader reads some thousands of nodes a second. An alias stands for all that its anchor holds: a few
 lines of aliases of aliases would stand for gigabytes in a message, or where mappings are merged.
 """
 
@@ -19,9 +19,9 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 
-#: Bytes. A rig of 64 cables takes 20 kB, a session of a thousand recordings 60 kB, and comments as much again.
+#: Bytes. A rig of 64 cables takes 20 kB, a session of a thousand recordings 60 kB, comments as much again.
 LARGEST = 1 << 17
-#: Nodes, what aliases stand for included. A rig of 64 cables has 1000, a session of a thousand recordings 8000.
+#: Nodes, what aliases stand for included. A rig of 64 cables has 1000, a session of a thousand bags 8000.
 MOST_NODES = 10_000
 #: Levels. The descriptions have six; other tools may add theirs to a file of ROS parameters.
 DEEPEST = 20
@@ -93,4 +93,6 @@ def _check_extent(text: str) -> None:
         if len(above) > DEEPEST:
             raise TooMuch(f"line {line}: is nested deeper than {DEEPEST} levels")
         if nodes > MOST_NODES:
-            raise TooMuch(f"line {line}: holds more than {MOST_NODES} values, or stands for as many by its aliases")
+            raise TooMuch(
+                f"line {line}: holds more than {MOST_NODES} values, or stands for as many by its aliases"
+            )

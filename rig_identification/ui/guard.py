@@ -102,7 +102,9 @@ class Guard:
     def _token_in_link(self, scope: Scope) -> bool:
         if scope["path"] != "/" or scope["method"] != "GET":
             return False
-        given = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8).get("token", [""])
+        given = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8).get(
+            "token", [""]
+        )
         return self._is_token(given[0])
 
     def _known(self, headers: dict[str, list[str]]) -> bool:
@@ -137,7 +139,8 @@ async def _body(receive: Receive, headers: dict[str, list[str]]) -> bytes | None
     body = b""
     while True:
         message = await receive()
-        body += message.get("body", b"")
+        piece: bytes = message.get("body", b"")
+        body += piece
         if len(body) > LARGEST_BODY:
             return None
         if message["type"] == "http.disconnect" or not message.get("more_body"):

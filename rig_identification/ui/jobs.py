@@ -35,6 +35,7 @@ class Job:
     title: str
     process: subprocess.Popen[str]
     started: float  # s, monotonic
+    out: str = ""  # name of the folder that its files go to
     ended: float | None = None
     state: str = RUNNING
     stage: str = "starting"
@@ -68,8 +69,8 @@ class Jobs:
         self._jobs: dict[str, Job] = {}
         self._lock = threading.Lock()
 
-    def start(self, task: str, title: str, request: Mapping[str, Any]) -> Job:
-        """Begin a task. Raises InputError where as many run as may."""
+    def start(self, task: str, title: str, request: Mapping[str, Any], out: str = "") -> Job:
+        """Begin a task. out: where its files go, for the page. Raises InputError where as many run as may."""
         with self._lock:
             running = [job for job in self._jobs.values() if job.state == RUNNING]
             if len(running) >= MOST_RUNNING:
@@ -77,7 +78,7 @@ class Jobs:
             for old in list(self._jobs)[: max(0, len(self._jobs) - MOST_KEPT + 1)]:
                 if self._jobs[old].state != RUNNING:
                     del self._jobs[old]
-            job = Job(secrets.token_urlsafe(9), task, title, _process(), time.monotonic())
+            job = Job(secrets.token_urlsafe(9), task, title, _process(), time.monotonic(), out)
             self._jobs[job.id] = job
         threading.Thread(target=self._follow, args=(job, {"task": task, **request}), daemon=True).start()
         return job

@@ -35,9 +35,7 @@ def identify(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
 
     session = _session(request)
     try:
-        result = identified(
-            session, namespace=request["namespace"], work=request["work"], progress=progress
-        )
+        result = identified(session, namespace=request["namespace"], work=request["work"], progress=progress)
     except Stopped as stopped:
         result = stopped.result
     progress("writing the report")
