@@ -80,7 +80,15 @@ class Folder:
                 return
             deep = len(here.relative_to(self.root).parts) >= DEEPEST
             folders[:] = [] if deep else sorted(name for name in folders if not name.startswith("."))
-            yield from (here / name for name in files if not name.startswith("."))
+            found = (here / name for name in files if not name.startswith("."))
+            yield from (file for file in found if self._holds(file))
+
+    def _holds(self, file: Path) -> bool:
+        """Whether a file lies in the folder by its links too."""
+        try:
+            return not file.is_symlink() or file.resolve().is_relative_to(self.root)
+        except (OSError, RuntimeError):  # a link to itself
+            return False
 
 
 def _names_cables(file: Path) -> bool:

@@ -102,9 +102,7 @@ class Guard:
     def _token_in_link(self, scope: Scope) -> bool:
         if scope["path"] != "/" or scope["method"] != "GET":
             return False
-        given = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8).get(
-            "token", [""]
-        )
+        given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])
         return self._is_token(given[0])
 
     def _known(self, headers: dict[str, list[str]]) -> bool:
@@ -134,7 +132,7 @@ def _headers(scope: Scope) -> dict[str, list[str]]:
 async def _body(receive: Receive, headers: dict[str, list[str]]) -> bytes | None:
     """The whole body; None where it is larger than it may be, which is told as soon as it is."""
     said = headers.get("content-length", ["0"])[0]
-    if not said.isdecimal() or int(said) > LARGEST_BODY:
+    if not said.isdecimal() or len(said) > len(str(LARGEST_BODY)) or int(said) > LARGEST_BODY:
         return None
     body = b""
     while True:

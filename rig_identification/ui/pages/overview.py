@@ -14,6 +14,9 @@ from rig_identification.ui.desk import Desk, shown
 from rig_identification.ui.folder import ANSWERS
 from rig_identification.ui.pages.identify import answer_folder
 
+#: Bytes of a result that is read for its verdict alone.
+QUICK = 1 << 22
+
 
 def _show(desk: Desk, _: Request) -> Response:
     sessions = [_session(desk, name) for name in desk.folder.sessions()]
@@ -39,7 +42,10 @@ def _below(desk: Desk, file: Path) -> str:
 
 
 def _verdict(file: Path) -> str:
+    """Verdict of a result; "" where there is none, or where reading it would take long."""
     try:
+        if file.stat().st_size > QUICK:
+            return ""
         verdict = json.loads(file.read_text(encoding="utf-8"))["mismatch"]["verdict"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return ""
