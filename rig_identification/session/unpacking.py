@@ -39,6 +39,8 @@ class _Decompressor(Protocol):
     @property
     def eof(self) -> bool: ...
     @property
+    def needs_input(self) -> bool: ...
+    @property
     def unused_data(self) -> bytes | None: ...
     def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
 
@@ -124,11 +126,12 @@ def unpack_file(source: BinaryIO, size: int, target: Path) -> bool:
     decompressor: _Decompressor = zstd.ZstdDecompressor()
     with target.open("wb") as out:
         while data := source.read(_AT_ONCE):
-            while data:
+            # A few bytes may stand for gigabytes: they are taken out piece by piece
+            while data or not (decompressor.eof or decompressor.needs_input):
                 if decompressor.eof:
                     decompressor = zstd.ZstdDecompressor()
                 try:
-                    piece = decompressor.decompress(data)
+                    piece = decompressor.decompress(data, _AT_ONCE)
                 except zstd.ZstdError as err:
                     raise Damaged("compressed data do not unpack") from err
                 data = (decompressor.unused_data or b"") if decompressor.eof else b""
