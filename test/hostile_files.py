@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 from rig_identification.session.unpacking import zstd
@@ -97,31 +98,49 @@ def rosbag1(size: int) -> bytes:
     )
 
 
-def bags() -> dict[str, tuple[str, bytes]]:
-    """Name -> the bag's file and its content."""
-    zeros, far = bytes(IDLE), bytes(IDLE + 1)
-    many = b"".join(topic(1 + i % 60_000, f"/t{i}") for i in range(200_000))
-    small = message(1, b"") * 3_000_000
-    constant = message(1, bytes(60_000)) * 4_000
-    return {
-        "a chunk of zeros": ("run.mcap", mcap(chunk(zeros))),
-        "a chunk beyond any recorder's": ("run.mcap", mcap(chunk(far))),
-        "thirty chunks of zeros": ("run.mcap", mcap(*[chunk(zeros)] * 30)),
-        "a chunk that claims an exabyte": ("run.mcap", mcap(chunk(b"x", claimed=1 << 60))),
-        "millions of empty messages": ("run.mcap", mcap(topic(1, WANTED), chunk(small))),
-        "millions of unknown records": ("run.mcap", mcap(chunk(record(200, b"") * 9_000_000))),
-        "messages that repeat": ("run.mcap", mcap(topic(1, WANTED), *[chunk(constant)] * 8)),
-        "very many topics": ("run.mcap", mcap(chunk(many))),
-        "very many topics, each in a chunk": (
-            "run.mcap",
-            mcap(*(chunk(topic(i, f"/t{i}"), "") for i in range(60_000))),
-        ),
-        "a record longer than the file": ("run.mcap", mcap()[:8] + struct.pack("<BQ", 6, 1 << 62)),
-        "a whole file of zeros": ("run.mcap.zstd", zstd.compress(mcap() + zeros * 12, 1)),
-        "a packed file in a packed file": ("run.mcap.zstd", zstd.compress(zstd.compress(zeros, 1), 1)),
-        "zeros of ROS 1": ("run.bag", rosbag1(IDLE)),
-        "sqlite3 of nothing": ("run.db3", b"SQLite format 3\0" + b"\xff" * 5_000_000),
-    }
+def _very_many_topics() -> bytes:
+    return mcap(chunk(b"".join(topic(1 + i % 60_000, f"/t{i}") for i in range(100_000))))
+
+
+def _zeros(chunks: int) -> bytes:
+    return mcap(*[chunk(bytes(IDLE))] * chunks)
+
+
+def _file_of_zeros() -> bytes:
+    packer = zstd.ZstdCompressor(1)
+    parts = [packer.compress(mcap())] + [packer.compress(bytes(IDLE // 4)) for _ in range(48)]
+    return b"".join([*parts, packer.flush()])
+
+
+#: Name -> the bag's file, and what makes its content.
+BAGS: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "a chunk of zeros": ("run.mcap", lambda: _zeros(1)),
+    "a chunk beyond any recorder's": ("run.mcap", lambda: mcap(chunk(bytes(IDLE + 1)))),
+    "thirty chunks of zeros": ("run.mcap", lambda: _zeros(30)),
+    "a chunk that claims an exabyte": ("run.mcap", lambda: mcap(chunk(b"x", claimed=1 << 60))),
+    "millions of empty messages": (
+        "run.mcap",
+        lambda: mcap(topic(1, WANTED), chunk(message(1, b"") * 3_000_000)),
+    ),
+    "millions of unknown records": ("run.mcap", lambda: mcap(chunk(record(200, b"") * 9_000_000))),
+    "messages that repeat": (
+        "run.mcap",
+        lambda: mcap(topic(1, WANTED), *[chunk(message(1, bytes(60_000)) * 4_000)] * 8),
+    ),
+    "very many topics": ("run.mcap", _very_many_topics),
+    "very many topics, each in a chunk": (
+        "run.mcap",
+        lambda: mcap(*(chunk(topic(i, f"/t{i}"), "") for i in range(60_000))),
+    ),
+    "a record longer than the file": ("run.mcap", lambda: mcap()[:8] + struct.pack("<BQ", 6, 1 << 62)),
+    "a whole file of zeros": ("run.mcap.zstd", _file_of_zeros),
+    "a packed file in a packed file": (
+        "run.mcap.zstd",
+        lambda: zstd.compress(zstd.compress(bytes(IDLE // 4), 1), 1),
+    ),
+    "zeros of ROS 1": ("run.bag", lambda: rosbag1(IDLE // 4)),
+    "sqlite3 of nothing": ("run.db3", lambda: b"SQLite format 3\0" + b"\xff" * 5_000_000),
+}
 
 
 def write_session(folder: Path, name: str, content: bytes) -> Path:

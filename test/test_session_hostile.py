@@ -46,8 +46,8 @@ import sys
 from pathlib import Path
 import hostile_files
 
-for name, (file, content) in hostile_files.bags().items():
-    hostile_files.write_session(Path(sys.argv[1]) / name, file, content)
+for name, (file, made) in hostile_files.BAGS.items():
+    hostile_files.write_session(Path(sys.argv[1]) / name, file, made())
 """
 
 
