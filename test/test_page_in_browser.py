@@ -41,7 +41,7 @@ def page_of(client: Client, width: int) -> Iterator[Any]:
     with playwright.sync_playwright() as started:
         browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": width, "height": 900})
-        page.set_default_timeout(60_000)
+        page.set_default_timeout(180_000)
         errors: list[str] = []
         page.on("pageerror", lambda error: errors.append(str(error)))
         # A fault that is told is an answer of 422, which a browser lists as an error too
