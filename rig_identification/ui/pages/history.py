@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
@@ -20,7 +19,7 @@ MOST_RESULTS = 200
 
 
 def _show(desk: Desk, request: Request) -> Response:
-    names = [name for name in desk.folder.results() if name.count("/") < 12]
+    names = desk.folder.results()
     files = {_short(desk, name): desk.folder.below(name) for name in names[:MOST_RESULTS]}
     results, faults = read_results(files)
     chosen = request.query_params.getlist("result") or [result.name for result in results]
@@ -40,7 +39,6 @@ def _row(desk: Desk, file: Any, result: Any, chosen: bool) -> dict[str, Any]:
     report = file.with_name("report.html")
     effects = dict.fromkeys(str(finding.get("effect")) for finding in result.findings)
     ten = elements(result.estimate)
-    std = np.sqrt(np.clip(np.diag(result.estimate.covariance), 0.0, None))
     return {
         "name": result.name,
         "chosen": chosen,
@@ -48,7 +46,6 @@ def _row(desk: Desk, file: Any, result: Any, chosen: bool) -> dict[str, Any]:
         "verdict": result.verdict,
         "findings": ", ".join(effects),
         "numbers": [ten[0], *ten[1:4], ten[4], ten[7], ten[9]],
-        "std": std,
         "report": desk.folder.name_of(report) if report.is_file() else "",
     }
 

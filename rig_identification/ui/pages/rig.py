@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ from starlette.routing import Route
 
 from rig_identification.api.describing import read_rig, rig_of, rig_parameters, rig_schema, rig_text
 from rig_identification.errors import FieldError, InputError
+from rig_identification.files import write_together
 from rig_identification.report.rig_drawing import rig_svgs
 from rig_identification.report.rig_scene import described_scene
 from rig_identification.rig import Rig
@@ -77,7 +76,10 @@ def _save(desk: Desk, given: Mapping[str, Any]) -> dict[str, Any]:
     text = rig_text(rig_of(_description(given)))
     if path.exists() and given.get(REPLACE) is not True:
         raise FieldError(f"{FILE}: exists", FILE, "exists already; tick “replace it”, or give another name")
-    _write(path, text)
+    try:
+        write_together(path.parent, {path.name: lambda aside: _write(aside, text)})
+    except InputError as error:
+        raise FieldError(f"{FILE}: {error}", FILE, str(error)) from error
     return {"html": {"saved": desk.part("saved.html.j2", name=desk.folder.name_of(path))}}
 
 
@@ -86,18 +88,7 @@ def _description(given: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write aside and rename. Raises FieldError."""
-    aside = ""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.chmod(aside, 0o644)  # mkstemp lets nobody else read it
-        os.replace(aside, path)
-    except OSError as error:
-        Path(aside).unlink(missing_ok=True) if aside else None
-        raise FieldError(f"{FILE}: {error}", FILE, f"cannot be written: {error.strerror or error}") from error
+    path.write_text(text, encoding="utf-8")
 
 
 ROUTES = [
