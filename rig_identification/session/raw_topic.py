@@ -41,7 +41,7 @@ def by_value(numbers: Integers) -> list[tuple[int, Integers]]:
     if not len(numbers):
         return []
     if numbers.min() == numbers.max():
-        return [(int(numbers[0]), np.arange(len(numbers)))]
+        return [(int(numbers[0]), np.arange(len(numbers), dtype=np.int64))]
     order = np.argsort(numbers, kind="stable")
     ends = np.flatnonzero(np.diff(numbers[order])) + 1
     return [(int(numbers[places[0]]), places) for places in np.split(order, ends)]
