@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 FURTHEST = 0.05
 #: Part of a displacement that the cables have to leave of it: what keeps less is another motion.
 LEAST_KEPT = 0.5
+#: m: hinges that lie apart by less are in one place, as far as 64 bits tell of a room.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ def _displaced(model: RigModel, start: Displaced, rest: State) -> State:
     asked = middle + turn.apply(hinges - center)
     resting = rest.position + hinges @ rest.R_world_body.T
     far = float(np.linalg.norm(asked - resting))
-    if far == 0.0:
+    if far < ROUNDING:
         return rest
 
     def missed(position: Array, turned: Rotation) -> float:
