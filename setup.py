@@ -50,6 +50,7 @@ setup(
         NAME: ["py.typed"],
         f"{NAME}.report": ["templates/*", "vendored/*/*"],
         f"{NAME}.thesis": ["tables/*"],
+        f"{NAME}.ui": ["templates/*", "static/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -108,7 +109,10 @@ setup(
             "pytest-xdist>=3.6",
             "pyulog>=1.0",
             "ruff>=0.17,<0.18",
+            "starlette>=0.40",
+            "uvicorn>=0.30",
         ],
+        "ui": ["starlette>=0.40", "uvicorn>=0.30"],
         "pdf": ["fpdf2>=2.7.9"],
         "completion": ["shtab>=1.6"],
         "browser": ["playwright>=1.40"],

@@ -28,6 +28,18 @@ class ArgumentError(InputError):
     """
 
 
+class FieldError(InputError):
+    """One value of a description that cannot be used.
+
+    key: its path from the top of the description, as ``cable_1.body_point[2]``. problem: the message without
+    file and key, for who shows it beside the value.
+    """
+
+    def __init__(self, message: str, key: str = "", problem: str = "") -> None:
+        super().__init__(message)
+        self.key, self.problem = key, problem
+
+
 class MissingDescription(InputError):
     """Bags without a session.yaml; ``proposal`` is the text of one that the user may edit and save."""
 

@@ -59,7 +59,10 @@ ALLOWED = {
     "live": {"model", "statics", "estimate"},
     "identification": {"check", "cleaning", "search", "session"},
     "": {"api"},
-    "api": CORE | {"check", "identification", "report", "session", "simulate", "thesis"},
+    "api": CORE
+    | {"check", "identification", "report", "session", "simulate", "thesis"}
+    | {"plan", "plan_report", "several"},
+    "ui": {"api", "report", "statics", "model", "plan_report", "session"},
     "nodes": CORE | {"cleaning", "session", "report", "identification"},
 }
 OUTSIDE_THE_CORE = {
@@ -73,6 +76,8 @@ OUTSIDE_THE_CORE = {
     "ruamel",
     "serial",
     "sqlite3",
+    "starlette",
+    "uvicorn",
     "yaml",
 }
 ROS = re.compile(r"rclpy|ament_index_python|launch|\w+_msgs|std_srvs")

@@ -155,3 +155,17 @@ def _account(recording: str, channel: RawChannel) -> dict[str, Any]:
         "messages": count,
         "rate": 1e9 / period if period > 0.0 else 0.0,
     }
+
+
+def named_files(session: str | Path) -> tuple[Path, ...]:
+    """All that a session's description names, and what lies in its bags. Raises InputError."""
+    from rig_identification.errors import MissingDescription
+    from rig_identification.session.provenance import files_at
+    from rig_identification.session.session_description import read_session_description
+
+    try:
+        description = read_session_description(Path(session))
+    except MissingDescription:
+        return (Path(session),)
+    bags = [entry.folder for entry in description.entries]
+    return (description.file, description.rig_file, *bags, *files_at(*bags))

@@ -63,6 +63,7 @@ def simulate(
     rest: float = 10.0,
     start: str | None = None,
     pull: float = 0.06,
+    displaced: Sequence[float] | None = None,
     shake: Sequence[float] | None = None,
     motor: Sequence[float] | None = None,
     plane: str = "xy",
@@ -91,6 +92,9 @@ def simulate(
         ``pulled`` aside and let go, at ``rest``, or as in the ``thesis`` (the default of a case).
     pull : float
         Force that pulls aside, as a share of the weight.
+    displaced : six numbers, optional
+        In place of ``start``: the runs begin so far off the rest pose, in the nearest pose that the cables
+        allow: x y z in m, then turns about world x, y and z in rad.
     shake : two numbers, optional
         Unbalanced mass of the exciter: its force as a share of the weight, at a speed in Hz.
     motor : three numbers, optional
@@ -121,7 +125,7 @@ def simulate(
 
     from rig_identification.simulate import simulate_session
 
-    asked = _Asked(case, rig, body, duration, rest, start, pull, shake, motor, plane)
+    asked = _Asked(case, rig, body, duration, rest, start, pull, displaced, shake, motor, plane)
     _check(asked, mocap, seed, without)
     spec = _of_case(asked) if case is not None else _of_rig(asked)
     spec = replace(
@@ -149,6 +153,7 @@ class _Asked:
     rest: float
     start: str | None
     pull: float
+    displaced: Sequence[float] | None
     shake: Sequence[float] | None
     motor: Sequence[float] | None
     plane: str
@@ -171,6 +176,8 @@ def _check(asked: _Asked, mocap: float, seed: int, without: Sequence[str]) -> No
         raise ArgumentError(f"start {asked.start}: is unknown; give {', '.join(STARTS)}")
     if asked.plane not in ("xy", "xz", "yz"):
         raise ArgumentError(f"plane {asked.plane}: is unknown; give xy, xz or yz")
+    if asked.displaced is not None and (len(asked.displaced) != 6 or asked.start is not None):
+        raise ArgumentError("displaced: give six numbers, x y z in m and three turns in rad, and no start")
     for device in without:
         if device not in DEVICES:
             raise ArgumentError(f"without {device}: is no device; give any of {', '.join(DEVICES)}")
@@ -216,11 +223,14 @@ def _moved(asked: _Asked, spec: SessionSpec, run: RunSpec, number: int) -> RunSp
     """The run with the start and the exciter asked for; a second run differs from the first."""
     import numpy as np
 
-    from rig_identification.simulate import AtRest, Pulled, UnbalancedMass
+    from rig_identification.simulate import AtRest, Displaced, Pulled, UnbalancedMass
 
     weight = float(spec.elements[0]) * spec.rig.gravity
     start = asked.start or ("thesis" if asked.case is not None else "pulled")
-    if start == "rest":
+    if asked.displaced is not None:
+        six = np.array(asked.displaced, dtype=float)
+        run = replace(run, start=Displaced(six[:3], six[3:]))
+    elif start == "rest":
         run = replace(run, start=AtRest())
     elif start == "pulled":
         heading = 0.9 + 1.2 * number

@@ -13,6 +13,7 @@ from rig_identification.files import Writer
 
 if TYPE_CHECKING:
     from rig_identification.api import Check, Result
+    from rig_identification.api.planning import Planned
 
 
 def check_output_folder(folder: Path, names: tuple[str, ...]) -> None:
@@ -57,7 +58,7 @@ def write_together(folder: Path, writers: Mapping[str, Writer]) -> None:
         raise InputError(f"--out {error}") from error
 
 
-def written(answer: Check | Result, folder: Path) -> None:
+def written(answer: Check | Result | Planned, folder: Path) -> None:
     """Write an answer's files into the folder. Raises InputError, which names the option."""
     try:
         answer.write(folder)

@@ -18,6 +18,9 @@ from rig_identification.several.session_result import SessionResult
 
 Array = NDArray[np.float64]
 
+#: Bytes. A result with the joint information of a thousand doubts takes 20 MB.
+LARGEST = 1 << 26
+
 
 def read_result(path: Path, name: str) -> SessionResult:
     """The answer in a ``result.json``.
@@ -28,10 +31,12 @@ def read_result(path: Path, name: str) -> SessionResult:
         It cannot be read, or is no result.
     """
     try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path}: is larger than {LARGEST >> 20} MiB, which no result is; leave it out")
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}; name a result.json or its folder") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is no JSON ({error}); identify the session again") from error
     try:
         return result_from_dict(document, name)

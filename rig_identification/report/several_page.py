@@ -92,7 +92,7 @@ def _sessions(found: Comparison) -> list[SessionRow]:
         against = found.sessions.get(result.name)
         start = 0 if result.joint is None else result.joint.start_ns
         p = "–" if against is None else _p(against.p)
-        rows.append(SessionRow(k, result.name, _date(start), rig, result.verdict, effects or "–", p))
+        rows.append(SessionRow(k, result.name, date_of(start), rig, result.verdict, effects or "–", p))
     return rows
 
 
@@ -156,7 +156,8 @@ def _p(p: float) -> str:
     return "below 10⁻¹²" if p < 1e-12 else significant(p, 2)
 
 
-def _date(start_ns: int) -> str:
+def date_of(start_ns: int) -> str:
+    """Date and time (UTC) of a stamp, or a dash where it tells none."""
     if start_ns < _FIRST_DATE:
         return "–"
     return datetime.fromtimestamp(start_ns / 1e9, tz=timezone.utc).strftime("%Y-%m-%d %H:%M")

@@ -87,6 +87,7 @@ def _read(path: Path, found: BagFiles, wanted: Collection[str]) -> Bag:
 
 def _read_file(file: Path, storage: str | None, contents: Contents) -> list[str]:
     """Read one file; what is to be said of it, in whole sentences."""
+    contents.begin(file.stat().st_size)
     with opened(file) as (inner, kind, notes):
         if kind not in _READERS:
             return [f"{file.name} is damaged or truncated: it does not begin as a bag's file"]

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
-from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from rig_identification.session.fields import one_line
+from rig_identification.session.yaml_text import TooMuch, load_yaml, read_text
 
 NAME = "metadata.yaml"
 _NEWEST = 9
@@ -35,9 +35,9 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
     if not file.is_file():
         return _nothing("is missing")
     try:
-        document = YAML(typ="safe").load(file.read_text(encoding="utf-8"))
+        document: Any = load_yaml(read_text(file))
         return _metadata(document["rosbag2_bagfile_information"])
-    except (YAMLError, OSError, UnicodeDecodeError) as err:
+    except (YAMLError, TooMuch, OSError, UnicodeDecodeError) as err:
         return _nothing(f"cannot be read ({one_line(getattr(err, 'problem', None) or err)})")
     except (KeyError, TypeError, ValueError, AttributeError) as err:
         return _nothing(f"does not say what it should ({one_line(err)})")

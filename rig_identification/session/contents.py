@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import ArrayLike
 from rosbags.typesys import Stores, get_typestore
 
 from rig_identification.errors import InputError
 from rig_identification.session.raw_topic import Bytes, Collector, Integers, RawTopic
-from rig_identification.session.unpacking import ZSTD_MAGIC, unpacked_message
+from rig_identification.session.unpacking import ZSTD_MAGIC, Damaged, unpacked_message
 
 #: Encodings of messages that are read; a file that does not say is taken to hold CDR, and is found out.
 _CDR, _ROS1 = ("cdr", ""), "ros1"
+#: Topics of one bag. A graph of robots has hundreds; each costs memory in every table of the bag.
+MOST_TOPICS = 10_000
+#: Bytes of kept messages that any bag may have, and beyond them how many for each byte of its files: messages
+#: that repeat themselves but for their stamps pack thirty to one.
+_ALWAYS_KEPT, _KEPT_RATIO = 1 << 27, 40
 _TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 
 _Prepare = Callable[[bytes], bytes]
@@ -36,7 +42,12 @@ class Contents:
         self._where = where
         self._wanted = wanted
         self._encoding: dict[str, str] = {}
+        self._left = _ALWAYS_KEPT
         self._collector = Collector()
+
+    def begin(self, file_size: int) -> None:
+        """A file of so many bytes is read next."""
+        self._left += _KEPT_RATIO * file_size
 
     def meet(self, topic: str, message_type: str, encoding: str) -> None:
         """Take note of a topic, as often as files name it.
@@ -44,8 +55,12 @@ class Contents:
         Raises
         ------
         InputError
-            A topic of two types.
+            A topic of two types, or more topics than a bag has.
         """
+        if len(self.listed) >= MOST_TOPICS and topic not in self.listed:
+            raise InputError(
+                f"{self._where}: names more than {MOST_TOPICS} topics; record the rig's own alone"
+            )
         kind = _ros2_name(message_type)
         if self.listed.setdefault(topic, kind) != kind:
             raise InputError(f"{self._where}: {topic}: recorded with two types; keep one publisher")
@@ -65,7 +80,9 @@ class Contents:
         if not messages:
             return
         prepare = self._prepare(topic, messages[0][:4])
-        self._collector.add(topic, received_ns, list(map(prepare, messages)) if prepare else messages)
+        ready = list(map(prepare, messages)) if prepare else messages
+        self._keep(sum(map(len, ready)))
+        self._collector.add(topic, received_ns, ready)
         self.counts[topic] += len(messages)
 
     def add_slices(
@@ -78,6 +95,7 @@ class Contents:
     ) -> None:
         """Keep the messages ``buffer[start:end]``. Raises Damaged, InputError."""
         if self._prepare(topic, buffer[starts[0] : starts[0] + 4].tobytes()) is None:
+            self._keep(int(np.sum(ends)) - int(np.sum(starts)))
             self._collector.add_slices(topic, received_ns, buffer, starts, ends)
             self.counts[topic] += len(starts)
             return
@@ -87,6 +105,12 @@ class Contents:
     def take(self, topic: str, message_type: str) -> RawTopic:
         """All messages of one topic; they are given up."""
         return self._collector.take(topic, message_type)
+
+    def _keep(self, size: int) -> None:
+        """Count bytes that are kept. Raises Damaged."""
+        if size > self._left:
+            raise Damaged("its messages unpack to more than such a file can hold")
+        self._left -= size
 
     def _prepare(self, topic: str, beginning: bytes) -> _Prepare | None:
         """What makes CDR of a topic's messages, by its encoding and the first bytes of one."""

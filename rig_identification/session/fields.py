@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import reprlib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -11,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from rig_identification.errors import InputError, did_you_mean
+from rig_identification.errors import FieldError, InputError, did_you_mean
+from rig_identification.session.yaml_text import TooMuch, load_yaml, read_text
 
 #: A quaternion further than this from norm 1 is a typing error, not rounding.
 QUATERNION_NORM_TOLERANCE = 1e-3
@@ -24,6 +26,16 @@ _SIGN, _POWER = "[+-]?", r"(?:[eE][+-]?\d+)?"
 def one_line(text: object) -> str:
     """``text`` on one line, for messages that quote another library."""
     return " ".join(str(text).split())
+
+
+def shown(value: object) -> str:
+    """A value as a message quotes it: of a long one its two ends, of a deep one its outside."""
+    return _QUOTED.repr(value)
+
+
+_QUOTED = reprlib.Repr()
+_QUOTED.maxlevel, _QUOTED.maxlist, _QUOTED.maxdict = 3, 8, 4
+_QUOTED.maxstring = _QUOTED.maxlong = _QUOTED.maxother = 80
 
 
 @dataclass(frozen=True)
@@ -36,7 +48,8 @@ class Fields:
 
     def fault(self, key: str, problem: str) -> InputError:
         """The error for ``key``: file, key path, then ``problem``."""
-        return InputError(one_line(f"{self.file}: {self.key_path(key)}: {problem}"))
+        path = self.key_path(key)
+        return FieldError(one_line(f"{self.file}: {path}: {problem}"), path, one_line(problem))
 
     def key_path(self, key: str) -> str:
         """Path of ``key`` from the top of the file, joined by dots."""
@@ -77,7 +90,7 @@ class Fields:
         value = self.require(key, f"{size} numbers in {unit}")
         if not isinstance(value, list):
             hint = f"; write it in brackets: [{value}]" if isinstance(value, str) else ""
-            raise self.fault(key, f"{value!r} is not a list; give {size} numbers in {unit}{hint}")
+            raise self.fault(key, f"{shown(value)} is not a list; give {size} numbers in {unit}{hint}")
         if len(value) != size:
             # 1,25 in a list is two whole numbers.
             whole = sum(isinstance(item, int) for item in value)
@@ -107,25 +120,25 @@ class Fields:
         value = self.values.get(key, default)
         if value not in words:
             near = did_you_mean(str(value), words)
-            raise self.fault(key, f"{value!r} is unknown; give {' or '.join(words)}{near}")
+            raise self.fault(key, f"{shown(value)} is unknown; give {' or '.join(words)}{near}")
         return str(value)
 
     def text(self, key: str, what: str, kind: str = "text") -> str:
         """Text at ``key``; ``kind``: what a value that is none is said not to be."""
         value = self.require(key, what)
         if not isinstance(value, str):
-            raise self.fault(key, f"{value!r} is not a {kind}; give {what}")
+            raise self.fault(key, f"{shown(value)} is not a {kind}; give {what}")
         return value
 
     def names(self, key: str, what: str, *, at_least: int, few: str) -> list[str]:
         """Names at ``key``, each once; ``few``: what is wrong with fewer than ``at_least``."""
         names = self.require(key, what)
         if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-            raise self.fault(key, f"{names!r} is not a list of names")
+            raise self.fault(key, f"{shown(names)} is not a list of names")
         if len(names) < at_least:
             raise self.fault(key, f"{len(names)} {few}")
-        for name in names:
-            if names.count(name) > 1:
+        for name, count in Counter(names).items():
+            if count > 1:
                 raise self.fault(key, f"{name} is listed twice; list each once")
         return names
 
@@ -137,7 +150,7 @@ class Fields:
         found = []
         for index, item in enumerate(listed):
             if not isinstance(item, dict):
-                raise self.fault(f"{key}[{index}]", f"{item!r} is not a mapping; give {form}")
+                raise self.fault(f"{key}[{index}]", f"{shown(item)} is not a mapping; give {form}")
             found.append(self.below(self.key_path(f"{key}[{index}]"), item))
         return found
 
@@ -145,14 +158,14 @@ class Fields:
         """True or false at ``key``; false where it is missing."""
         value = self.values.get(key, False)
         if not isinstance(value, bool):
-            raise self.fault(key, f"{value!r} is unknown; give true or false")
+            raise self.fault(key, f"{shown(value)} is unknown; give true or false")
         return value
 
     def section(self, key: str, what: str) -> Fields:
         """Mapping at ``key``."""
         value = self.require(key, what)
         if not isinstance(value, dict):
-            raise self.fault(key, f"{value!r} is not a mapping; give {what}")
+            raise self.fault(key, f"{shown(value)} is not a mapping; give {what}")
         return self.below(self.key_path(key), value)
 
     def below(self, path: str, values: Mapping[str, object]) -> Fields:
@@ -190,7 +203,7 @@ class Fields:
 
     def _finite(self, key: str, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.fault(key, f"{value!r} is not a number{number_hint(value)}")
+            raise self.fault(key, f"{shown(value)} is not a number{number_hint(value)}")
         if not math.isfinite(value):
             raise self.fault(key, f"{value} is not finite")
         return float(value)
@@ -214,7 +227,7 @@ def number_hint(value: object) -> str:
 def load_fields(file: Path, what: str) -> Fields:
     """Top mapping of the YAML 1.2 file ``file``; ``what`` names the file's role in messages."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file)
     except FileNotFoundError as err:
         beside = [other.name for other in file.parent.iterdir()] if file.parent.is_dir() else []
         near = did_you_mean(file.name, beside)
@@ -223,9 +236,10 @@ def load_fields(file: Path, what: str) -> Fields:
         raise InputError(f"{file}: {what} is no text in UTF-8; save it as UTF-8") from err
     except OSError as err:
         raise InputError(one_line(f"{file}: {what} cannot be read: {err}")) from err
+    except TooMuch as err:
+        raise InputError(f"{file}: {what} cannot be used: {err}") from err
     try:
-        # The pure loader is YAML 1.2: 1e-3 is a number, and a key given twice is a fault.
-        values = YAML(typ="safe", pure=True).load(text)
+        values = load_yaml(text)
     except (YAMLError, ValueError) as err:
         raise InputError(one_line(f"{file}: {what} is not valid YAML: {_first_fault(err)}")) from err
     if not isinstance(values, dict):

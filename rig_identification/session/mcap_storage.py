@@ -15,7 +15,7 @@ import numpy as np
 
 from rig_identification.session.contents import Contents
 from rig_identification.session.file_end import written_size
-from rig_identification.session.unpacking import Damaged, unpacked
+from rig_identification.session.unpacking import Allowance, Damaged, most_records, unpacked
 
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F
@@ -38,13 +38,13 @@ def collect_mcap(path: Path, contents: Contents) -> list[str]:
     InputError
         A topic of two types, or messages of an encoding that is not read.
     """
-    reading = _Reading(contents)
+    size = written_size(path)
+    reading = _Reading(contents, Allowance(size))
     with path.open("rb") as file:
-        size = written_size(path)
         file.seek(len(MAGIC))
-        for buffer, whole in reading.buffers(file, size):
+        for buffer, whole, most in reading.buffers(file, size):
             try:
-                reading.take(buffer, whole)
+                reading.take(buffer, whole, most)
             except Damaged as err:
                 reading.damage.append(str(err))
     return reading.notes()
@@ -53,10 +53,12 @@ def collect_mcap(path: Path, contents: Contents) -> list[str]:
 class _Reading:
     """One pass over one file."""
 
-    def __init__(self, contents: Contents) -> None:
+    def __init__(self, contents: Contents, allowance: Allowance) -> None:
         self._contents = contents
+        self._allowance = allowance
         self._types: dict[int, str] = {}  # schema id -> message type
         self._topics: dict[int, str] = {}  # channel id -> topic
+        self._kept: set[int] = set()  # channel ids whose messages are wanted
         self._chunks = 0
         self._cut_at: int | None = None  # byte at which the file stops being records
         self._data_end = self._closed = self._indexed = False
@@ -83,27 +85,30 @@ class _Reading:
             notes.append(f"holds {self._undescribed} messages of no described topic: left out")
         return notes
 
-    def buffers(self, file: BinaryIO, size: int) -> Iterator[tuple[bytes, bool]]:
-        """Runs of records, each with whether it is whole: chunks unpacked, and records outside of chunks."""
+    def buffers(self, file: BinaryIO, size: int) -> Iterator[tuple[bytes, bool, int]]:
+        """Runs of records: chunks unpacked, and records outside of chunks.
+
+        Each with whether it is whole, and with how many records it may hold.
+        """
         loose = bytearray()
         for opcode, length, body in self._records(file, size):
             if opcode == _CHUNK:
                 if loose:
-                    yield bytes(loose), True
+                    yield bytes(loose), True, len(loose)
                     loose.clear()
                 self._chunks += 1
                 try:
-                    records = _records_of(body, length)
+                    records = _records_of(body, length, self._allowance)
                 except Damaged as err:
                     self.damage.append(str(err))
                     continue
-                yield records, len(body) == length
+                yield records, len(body) == length, most_records(length)
             elif len(body) == length:
                 loose += _RECORD.pack(opcode, length) + body
                 if len(loose) > _LOOSE_AT_ONCE:
-                    yield bytes(loose), True
+                    yield bytes(loose), True, len(loose)
                     loose.clear()
-        yield bytes(loose), True
+        yield bytes(loose), True, len(loose)
 
     def _records(self, file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
         """Opcode, length and body of the records that tell of messages; the last body may be cut off."""
@@ -129,16 +134,17 @@ class _Reading:
             self._data_end |= opcode == _DATA_END
             file.seek(length, 1)
 
-    def take(self, buffer: bytes, whole: bool) -> None:
-        """Add the messages of a run of records. Raises Damaged, InputError."""
-        contents, topics = self._contents, self._topics
+    def take(self, buffer: bytes, whole: bool, most: int) -> None:
+        """Add the messages of a run of at most ``most`` records. Raises Damaged, InputError."""
         found: dict[int, tuple[list[int], list[int], list[int]]] = {
-            channel: ([], [], []) for channel, topic in topics.items() if contents.wants(topic)
+            channel: ([], [], []) for channel in self._kept
         }
         others: dict[int, int] = {}
         position, end = 0, len(buffer)
         unpack, size = _MESSAGE_HEAD.unpack_from, _MESSAGE_HEAD.size
-        while position + size <= end:
+        for _ in range(most):
+            if position + size > end:
+                break
             opcode, length, channel, _, received, _ = unpack(buffer, position)
             following = position + _RECORD.size + length
             if opcode == _MESSAGE and following <= end:
@@ -152,6 +158,9 @@ class _Reading:
             elif opcode in (_SCHEMA, _CHANNEL) and following <= end:
                 self._describe(buffer, position, found)
             position = following
+        else:
+            if position + size <= end:
+                raise Damaged(f"a chunk holds more than {most} records")
         while position + _RECORD.size <= end:  # short ones at the end
             length = int.from_bytes(buffer[position + 1 : position + _RECORD.size], "little")
             following = position + _RECORD.size + length
@@ -177,7 +186,10 @@ class _Reading:
                 self._contents.meet(topic, self._types.get(schema, ""), _string(body, behind)[0])
                 self._topics[channel] = topic
                 if self._contents.wants(topic):
+                    self._kept.add(channel)
                     found.setdefault(channel, ([], [], []))
+                else:
+                    self._kept.discard(channel)
         except (struct.error, UnicodeDecodeError) as err:
             raise Damaged("a topic's description is no text") from err
 
@@ -204,7 +216,7 @@ def _string(body: bytes, at: int) -> tuple[str, int]:
     return body[at + 4 : at + 4 + length].decode(), at + 4 + length
 
 
-def _records_of(chunk: bytes, length: int) -> bytes:
+def _records_of(chunk: bytes, length: int, allowance: Allowance) -> bytes:
     """Records of a chunk of ``length`` bytes, as many as ``chunk`` has of them. Raises Damaged."""
     if len(chunk) < _CHUNK_HEAD.size:
         return b""
@@ -218,6 +230,7 @@ def _records_of(chunk: bytes, length: int) -> bytes:
         raise Damaged(f"a chunk of {length} bytes says that its records take {packed}")
     records = chunk[start:]
     if name:
+        allowance.take(size)
         records = unpacked(name, records, size)
     if len(chunk) < length:
         return records[:size]

@@ -36,11 +36,15 @@ class RawTopic:
         return len(self.received_ns)
 
 
-def distinct(numbers: Integers) -> list[int]:
-    """Distinct ``numbers``; mostly there is one."""
-    if len(numbers) and numbers.min() == numbers.max():
-        return [int(numbers[0])]
-    return [int(number) for number in np.unique(numbers)]
+def by_value(numbers: Integers) -> list[tuple[int, Integers]]:
+    """Each distinct number with the places where it stands, in their order; mostly there is one number."""
+    if not len(numbers):
+        return []
+    if numbers.min() == numbers.max():
+        return [(int(numbers[0]), np.arange(len(numbers), dtype=np.int64))]
+    order = np.argsort(numbers, kind="stable")
+    ends = np.flatnonzero(np.diff(numbers[order])) + 1
+    return [(int(numbers[places[0]]), places) for places in np.split(order, ends)]
 
 
 def slices(buffer: Bytes, starts: Integers, length: int) -> Bytes:
@@ -59,8 +63,7 @@ class Collector:
     def add(self, topic: str, received_ns: ArrayLike, messages: Sequence[bytes]) -> None:
         """Add ``messages``."""
         lengths = np.fromiter(map(len, messages), np.int64, len(messages))
-        for length in distinct(lengths):
-            chosen = np.flatnonzero(lengths == length)
+        for length, chosen in by_value(lengths):
             joined = b"".join([messages[i] for i in chosen.tolist()])
             self._append(topic, chosen, np.frombuffer(joined, np.uint8).reshape(len(chosen), length))
         self._advance(topic, received_ns)
@@ -71,8 +74,7 @@ class Collector:
         """Add the messages ``buffer[start:end]``."""
         first, behind = np.asarray(starts), np.asarray(ends)
         lengths = behind - first
-        for length in distinct(lengths):
-            chosen = np.flatnonzero(lengths == length)
+        for length, chosen in by_value(lengths):
             self._append(topic, chosen, slices(buffer, first[chosen], length))
         self._advance(topic, received_ns)
 

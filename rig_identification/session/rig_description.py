@@ -27,6 +27,8 @@ FARTHEST_ORIGIN = 10_000.0  # m
 LENGTH_HINT = "is it in mm? lengths are in m"
 _CABLE_KEYS = ("ceiling_point", "body_point", "length", "load_cell")
 _MOUNTS = ("imu", "inclinometer", "exciter", "mocap")
+#: Six cables hold a body in place; no lab hangs one on ten times as many.
+MOST_CABLES = 64
 _WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 #: m: wheels nearer to each other than this span no ground plane.
 LEAST_TRACK = 0.05
@@ -124,6 +126,8 @@ def _cable_names(top: Fields) -> list[str]:
     names = top.names(
         "cables", "the list of the cables' names", at_least=2, few="cable(s); the body hangs on at least 2"
     )
+    if len(names) > MOST_CABLES:
+        raise top.fault("cables", f"{len(names)} cables; give at most {MOST_CABLES}")
     for name in names:
         if name in DEVICES or name in _TOP_KEYS:
             raise top.fault("cables", f"{name} is the name of another part of the rig; rename the cable")

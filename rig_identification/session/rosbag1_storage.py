@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from rig_identification.session.contents import Contents
 from rig_identification.session.file_end import written_size
-from rig_identification.session.unpacking import Damaged, unpacked
+from rig_identification.session.unpacking import Allowance, Damaged, most_records, unpacked
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _BAG, _CHUNK, _CONNECTION = 0x02, 0x03, 0x05, 0x07
@@ -35,8 +35,8 @@ def collect_rosbag1(path: Path, contents: Contents) -> list[str]:
     InputError
         A topic of two types, or a message that is none of its type.
     """
-    reading = _Reading(contents)
     size = written_size(path)
+    reading = _Reading(contents, Allowance(size))
     with path.open("rb") as file:
         file.seek(len(MAGIC))
         cut_at = reading.run(file, size)
@@ -53,7 +53,8 @@ def collect_rosbag1(path: Path, contents: Contents) -> list[str]:
 class _Reading:
     """One pass over one file."""
 
-    def __init__(self, contents: Contents) -> None:
+    def __init__(self, contents: Contents, allowance: Allowance) -> None:
+        self._allowance = allowance
         self.indexed = False
         self.damage: list[str] = []  # what is wrong with each piece that is left out
         self._contents = contents
@@ -81,16 +82,18 @@ class _Reading:
         if kind == _BAG:
             self.indexed = _number(header, "index_pos") > 0
         elif kind == _CHUNK:
-            self._take(_records_of(header, data, whole))
+            self._take(_records_of(header, data, whole, self._allowance), most_records(len(data)))
         elif kind == _CONNECTION and whole:
             self._describe(header, _header(data) or {})
         elif kind == _MESSAGE and whole:
             self._add(header, [(_time(header), data)])
 
-    def _take(self, records: bytes) -> None:
-        """Messages of a chunk."""
+    def _take(self, records: bytes, most: int) -> None:
+        """Messages of a chunk of at most ``most`` records."""
         found: dict[int, list[tuple[int, bytes]]] = defaultdict(list)
-        for header, start, end in _split(records):
+        for number, (header, start, end) in enumerate(_split(records)):
+            if number == most:
+                raise Damaged(f"a chunk holds more than {most} records")
             kind = _number(header, "op")
             if kind == _CONNECTION:
                 self._describe(header, _header(records[start:end]) or {})
@@ -155,10 +158,14 @@ def _split(records: bytes) -> Iterator[_Record]:
             yield header, data, position
 
 
-def _records_of(header: dict[str, bytes], data: bytes, whole: bool) -> bytes:
+def _records_of(header: dict[str, bytes], data: bytes, whole: bool, allowance: Allowance) -> bytes:
     """Records of a chunk, as many as ``data`` has of them. Raises Damaged."""
     compression, size = header.get("compression", b"").decode(errors="replace"), _number(header, "size")
-    records = data if compression == "none" else unpacked(compression, data, size)
+    if compression == "none":
+        records = data
+    else:
+        allowance.take(size)
+        records = unpacked(compression, data, size)
     if whole and len(records) != size:
         raise Damaged(f"a chunk does not hold the {size} bytes it says")
     return records

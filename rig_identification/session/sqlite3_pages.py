@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig_identification.session.raw_topic import Bytes, Integers, distinct, slices
+from rig_identification.session.raw_topic import Bytes, Integers, by_value, slices
 
 _PAGES_AT_ONCE = 512
 _INTERIOR, LEAF = 0x05, 0x0D
@@ -183,11 +183,10 @@ def _varint(buffer: Bytes, at: Integers) -> tuple[Integers, Integers]:
 def _integer(buffer: Bytes, at: Integers, kinds: Integers) -> tuple[Integers, Integers]:
     """Integers of serial types ``kinds`` at ``at``, and the places behind them."""
     value, behind = np.empty(len(at), np.int64), at.copy()
-    for kind in distinct(kinds):
+    for kind, chosen in by_value(kinds):
         if kind not in INTEGER_BYTES:
             raise UnknownLayout("a number of another type")
         size = INTEGER_BYTES[kind]
-        chosen = slice(None) if np.all(kinds == kind) else np.flatnonzero(kinds == kind)
         if size == 0:
             value[chosen] = kind - 8
             continue

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
-from typing import Literal
+from typing import Literal, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,11 +114,16 @@ def _check(session: Session, folder: Path, storage: str, compression: str, overw
 
 
 def _dump(document: dict[str, object], file: Path) -> None:
+    with file.open("w", encoding="utf-8") as stream:
+        dump(document, stream)
+
+
+def dump(document: dict[str, object], stream: TextIO) -> None:
+    """Write a document as YAML, its keys in their order."""
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    with file.open("w", encoding="utf-8") as stream:
-        yaml.dump(document, stream)
+    yaml.dump(document, stream)
 
 
 def _session_document(session: Session) -> dict[str, object]:

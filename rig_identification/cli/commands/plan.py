@@ -16,9 +16,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig_identification.cli.output import check_output_folder, write_together
+from rig_identification.api.planning import EXCITERS, FILES, PAGE
+from rig_identification.cli.output import check_output_folder, written
 from rig_identification.cli.progress import StageProgress
-from rig_identification.errors import InputError
+from rig_identification.errors import ArgumentError
 from rig_identification.result import ELEMENTS
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-PAGE, DOCUMENT, SESSION, RIG, COMMANDS = "plan.html", "plan.json", "session.yaml", "rig.yaml", "exciter.csv"
-FILES = (PAGE, DOCUMENT, SESSION, RIG, COMMANDS)
 DEVICES = ("tension", "exciter", "imu", "inclinometer")
 
 
@@ -58,7 +57,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--minutes", type=float, default=5.0, metavar="MIN", help="in all (default: 5)")
     parser.add_argument(
         "--exciter",
-        choices=("motor", "shaker"),
+        choices=EXCITERS,
         default="motor",
         help="a mass on a motor, or any force (default: motor)",
     )
@@ -82,91 +81,37 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Plan, write, and print what to record."""
-    from rig_identification.plan import plan
+    from rig_identification.api.planning import plan_session
     from rig_identification.session import read_rig
 
     check_output_folder(arguments.out, FILES)
-    rig = read_rig(arguments.rig)
-    body, means = body_of(arguments, rig), means_of(arguments)
+    body, means = body_of(arguments, read_rig(arguments.rig)), means_given(arguments)
     with StageProgress(sys.stderr) as progress:
-        found = plan(rig, body, means, progress)
+        found = plan_session(arguments.rig, body, means, progress=progress)
         progress("writing the plan")
-        _write(found, arguments.rig, arguments.out)
-    _print(found, arguments.out)
+        written(found, arguments.out)
+    _print(found.plan, arguments.out)
 
 
 def body_of(arguments: argparse.Namespace, rig: Rig) -> Array:
     """(10,) the body to plan for. Raises InputError where the arguments describe none."""
-    import numpy as np
-
+    from rig_identification.api.planning import boxed, given_body
     from rig_identification.cli.commands.modes import found_elements
-    from rig_identification.model.body import can_exist
-    from rig_identification.plan import box
 
-    if arguments.box is None:
-        for name in ("center", "mass"):
-            if getattr(arguments, name) is not None:
-                raise InputError(f"--{name}: belongs to --box; leave it out")
-        elements = np.array(arguments.body or found_elements(arguments.after, "--after"), dtype=float)
-    else:
-        mass = arguments.mass if arguments.mass is not None else rig.mass
-        if mass is None:
-            raise InputError("--mass: missing, and the description has none; weigh the body or guess")
-        if not (mass > 0.0 and min(arguments.box) > 0.0):
-            raise InputError(f"--box: edges and mass must be positive, not {arguments.box} m and {mass:g} kg")
-        center = None if arguments.center is None else np.array(arguments.center)
-        elements = box(rig, mass, np.array(arguments.box), center)
-    if not can_exist(elements):
-        raise InputError("--body: no body has this mass and inertia; check the order " + " ".join(ELEMENTS))
-    return elements
+    if arguments.box is not None:
+        return boxed(rig, arguments.box, arguments.mass, arguments.center)
+    for name in ("center", "mass"):
+        if getattr(arguments, name) is not None:
+            raise ArgumentError(f"{name}: belongs to --box; leave it out")
+    return given_body(arguments.body or found_elements(arguments.after, "--after"))
 
 
-def means_of(arguments: argparse.Namespace) -> Means:
+def means_given(arguments: argparse.Namespace) -> Means:
     """What there is to record with. Raises InputError for a number that makes no sense."""
-    from rig_identification.plan import Means
-    from rig_identification.simulate import SampleRates
+    from rig_identification.api.planning import LIMITS, means_of
 
-    limits = {
-        "minutes": 1e3,
-        "force": 1.0,
-        "pull": 0.5,
-        "highest": 20.0,
-        "travel": 10.0,
-        "taut": 0.9,
-        "rest": 600.0,
-    }
-    for name, most in limits.items():
-        if not 0.0 < getattr(arguments, name) <= most:
-            raise InputError(
-                f"--{name} {getattr(arguments, name):g}: give a number above 0 and up to {most:g}"
-            )
-    if not 0.0 <= arguments.changeover <= 3600.0:
-        raise InputError(f"--changeover {arguments.changeover:g}: give 0 to 3600 s")
-    if not 0.0 <= arguments.mocap <= 2000.0:
-        raise InputError(f"--mocap {arguments.mocap:g}: give a rate up to 2000 Hz, or 0 for none")
-    rates = SampleRates(mocap=arguments.mocap, **dict.fromkeys(arguments.without, 0.0))
-    named = {name: getattr(arguments, name) for name in (*limits, "changeover")}
-    return Means(exciter=arguments.exciter, rates=rates, **named)
-
-
-def _write(found: Plan, rig: Path, out: Path) -> None:
-    from rig_identification.plan_report import write_commands, write_plan, write_plan_page, write_session_text
-
-    described = rig.read_bytes()
-    write_together(
-        out,
-        {
-            PAGE: lambda path: write_plan_page(found, path),
-            DOCUMENT: lambda path: write_plan(found, path),
-            SESSION: lambda path: write_session_text(found, RIG, path),
-            RIG: lambda path: _copy(described, path),
-            COMMANDS: lambda path: write_commands(found, path),
-        },
-    )
-
-
-def _copy(content: bytes, path: Path) -> None:
-    path.write_bytes(content)
+    named = {name: getattr(arguments, name) for name in (*LIMITS, "changeover", "mocap")}
+    return means_of(exciter=arguments.exciter, without=arguments.without, **named)
 
 
 def _print(found: Plan, out: Path) -> None:

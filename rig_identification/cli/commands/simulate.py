@@ -36,6 +36,7 @@ OPTIONS = (
     "rest",
     "start",
     "pull",
+    "displaced",
     "shake",
     "motor",
     "plane",
@@ -63,6 +64,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--start", choices=STARTS, help="default: thesis with --case, else pulled")
     parser.add_argument("--pull", type=float, default=0.06, help="share of the weight (default: 0.06)")
+    parser.add_argument(
+        "--displaced",
+        type=float,
+        nargs=6,
+        metavar=("X", "Y", "Z", "RX", "RY", "RZ"),
+        help="let go off its rest: m, then rad about world x, y, z; without --start",
+    )
     shaken = parser.add_mutually_exclusive_group()
     shaken.add_argument(
         "--shake",
