@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import AXES, Channel, Run, axis_name
 from rig_identification.estimate.lag import lagged
-from rig_identification.estimate.prediction import Linearised, seen_of_sway, smoothed
+from rig_identification.estimate.prediction import Linearised, seen_of_pose, seen_of_sway, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
 from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
@@ -46,8 +46,23 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
         late = own[places.clock(channel.device)]
         each = np.arange(channel.time.size)
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
-        fits += _axes(run.recording.name, channel, np.asarray(value @ nodes), run.offset)
+        predicted = np.asarray(value @ nodes) + _pose_error(run, linearised, index)
+        fits += _axes(run.recording.name, channel, predicted, run.offset)
     return fits
+
+
+def _pose_error(run: Run, linearised: Linearised, index: int) -> Array:
+    """(n, w) the likeliest error of a tracker that goes with the pose, at each sample of a channel."""
+    channel = run.channels[index]
+    out = np.zeros(channel.values.shape)
+    if index not in run.pose_shapes or channel.wander is None:
+        return out
+    every = seen_of_pose(run, linearised.channel, linearised.axis, linearised.variance)
+    mine = [found for found in every if linearised.channel[found[0][0]] == index]
+    for k, (rows, seen) in enumerate(mine):
+        left = linearised.plain[rows] / np.sqrt(linearised.variance[rows])
+        out[:, k] = channel.wander[k] * (run.pose_shapes[index] @ likeliest_sway(seen, left))
+    return out
 
 
 #: Hz. Smoother than a film; the slowest swing of a rig has many frames still.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -339,6 +340,10 @@ def linearise_run(
             beside = columns[rows]
             log_spread += without_sway(seen, beside)
             columns[rows] = beside
+        for mine, seen in seen_of_pose(run, which, axis, variance):
+            beside = columns[mine]
+            log_spread += without_sway(seen, beside)
+            columns[mine] = beside
     if columns.size and not max(float(np.max(columns)), -float(np.min(columns))) < LARGEST:
         # Derivatives of motions that part from each other may grow beyond every number
         return None
@@ -382,6 +387,24 @@ def seen_of_sway(
             seen = np.asarray(value @ shapes) / np.sqrt(variance[which == index])[:, None]
             out[index] = shapes, seen
     return out
+
+
+def seen_of_pose(
+    run: Run, which: NDArray[np.int64], axis: NDArray[np.int64], variance: Array
+) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """A tracker's error that goes with the pose, an axis at a time: its rows, and (rows, k) what it may be.
+
+    In units of the rows' noise. which, axis (m,): channel and axis of each row; variance (m,): its noise.
+    """
+    for index, shapes in run.pose_shapes.items():
+        channel = run.channels[index]
+        if channel.wander is None:
+            continue
+        count = np.bincount(channel.group)
+        grouped = np.stack([np.bincount(channel.group, v) / count for v in shapes.T], axis=1)
+        for a, std in zip(channel.axes, channel.wander, strict=True):
+            rows = np.flatnonzero((which == index) & (axis == a))
+            yield rows, std * grouped / np.sqrt(variance[rows])[:, None]
 
 
 def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array, Array, Array]:

@@ -22,14 +22,16 @@ from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hands import hand_finding, nobody_held
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
-from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Notify, damped
+from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Choice, Notify, damped, exchanged
 from rig_identification.mismatch.threads import physics_of_pendulums
-from rig_identification.mismatch.trial import Trial, log_evidence, mass_of, may_be_none
+from rig_identification.mismatch.tracker_error import tracker_findings
+from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, may_be_none
 from rig_identification.result import ELEMENTS, Mismatch
 
 #: How many times as long pieces are: friction shows against the amplitude, which must change within one.
@@ -120,12 +122,17 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     choice, problem, parted = answer
     notify("weighing each channel by its residual", 0.65)
     careful = _tempered(*solve_cautiously(replace(problem, runs=raw.runs), parted.point))
+    if not _sure(choice.effects, careful):
+        # Each may be none beside the others: the one that shows most has to be there by itself
+        choice, careful = _one_alone(raw, parts, choice, careful)
+        if not _sure(choice.effects, careful):
+            return None
     notify("search: whole runs", 0.75)
     heavy, point = _begun_whole(ideal, *careful)
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
     fitted = _scored(ideal, heavy, whole, converged)
     evidence_of_all = log_evidence(whole)
-    found = _told([Trial(c, heavy, whole, evidence_of_all, True) for c in choice.effects], careful)
+    found = [Trial(c, heavy, whole, evidence_of_all, True) for c in _sure(choice.effects, careful)]
     after, verdict = judged(fitted)
     told = estimates(fitted.problem, fitted.evaluation, spread=careful[1])
     evidence = evidence_of(found_ideal, fitted, after.holdout)
@@ -133,6 +140,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     hand = hand_finding(ideal)
     if hand is not None and not (verdict.verdict == "none" and nobody_held(fitted)):
         findings.append(hand)
+    findings += tracker_findings(fitted, evidence)
     named = effects_of(findings)
     if verdict.verdict == "none":
         mismatch = Mismatch(
@@ -146,13 +154,25 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
 
 
-def _told(found: list[Trial], careful: tuple[Problem, Evaluation]) -> list[Trial]:
-    """What is told of the effects in the model: no amount that may as well be none, beside one that may not.
+def _sure(effects: tuple[Candidate, ...], careful: tuple[Problem, Evaluation]) -> tuple[Candidate, ...]:
+    """Effects in the model that may not as well be none. careful: the fit whose intervals are told."""
+    trials = [Trial(c, *careful, log_evidence(careful[1]), True) for c in effects]
+    return tuple(t.candidate for t in trials if not may_be_none(t))
 
-    careful: the cautious fit, whose intervals are told.
+
+def _one_alone(
+    raw: Problem, base: Problem, choice: Choice, careful: tuple[Problem, Evaluation]
+) -> tuple[Choice, tuple[Problem, Evaluation]]:
+    """The cautious fit with the one effect in the model whose amount is the most std from none.
+
+    raw: pieces with the sensors' own noise; base: without any effect.
     """
-    sure = [t for t in found if not may_be_none(replace(t, problem=careful[0], evaluation=careful[1]))]
-    return sure or found
+    seen = in_stds(Trial(choice.effects[0], *careful, 0.0))
+    clearest = max(choice.effects, key=lambda c: max(abs(seen[p.name]) for p in c.parameters))
+    chosen, holding = ((clearest,), ()) if clearest in choice.chosen else ((), (clearest,))
+    alone = replace(choice, chosen=chosen, holding=holding)
+    problem, evaluation = exchanged(base, *careful, choice, alone)
+    return alone, _tempered(*solve_cautiously(replace(problem, runs=raw.runs), evaluation.point))
 
 
 def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:
