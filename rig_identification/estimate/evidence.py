@@ -40,12 +40,13 @@ SELDOM = 1.5
 #: Root mean square error of that cubic, in units of one sample's noise, up to which it follows: of a whole
 #: run, and of its worst second, in which 0.8 is still chance.
 FOLLOWED, FOLLOWED_AT_WORST = 0.1, 1.0
-#: Shortest node spacing where a run is only watched: no device follows more than the swing itself, whose pose
-#: a cubic through such nodes holds to 1e-4 at 1.5 Hz.
-WATCHED_NODE_STEP = 0.025
-#: Nodes in a swing where a run is only watched, and their longest spacing (s). A Runge-Kutta step keeps the
-#: swing's frequency to (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6. Rolling four times as fast
-#: keeps its frequency to 2e-4 and its angle to 6e-4 of an amplitude of milliradians.
+#: Shortest and longest node spacing where a run is only watched: no device follows more than swing and
+#: rolling. Cubics through such nodes hold a pose to 1e-4 and 5e-4 of its amplitude at 1.5 Hz, and
+#: Runge-Kutta steps its frequency to 3e-5 and 2e-4.
+WATCHED_NODE_STEP, WIDE_WATCHED_NODE_STEP = 0.025, 0.04
+#: Nodes in a swing where a run is only watched. A Runge-Kutta step keeps the swing's frequency to
+#: (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6. And their longest spacing (s) where nothing but the turn
+#: about the vertical is measured: what the body does faster, rolling at some hertz, no such device feels.
 SWING_NODES, LONGEST_NODE_STEP = 64.0, 0.1
 #: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).
 MARGIN = 0.02
@@ -163,19 +164,17 @@ class Run:
         return tuple(Sampler(self.grid, c.time, c.group, c.node.size) for c in self.channels)
 
     @cached_property
-    def pose_shapes(self) -> dict[int, Array]:
-        """(n, k) what a tracker's error may be at each sample, by channel; none where none is."""
-        if self.turning is None:
+    def pose_shapes(self) -> dict[int, tuple[Array, Array]]:
+        """What a tracker's error may be, by channel: (n, k) at each sample and (groups, k) at each group."""
+        seen = [c for c in self.channels if self.turning is not None and c.key == self.turning.key]
+        if self.turning is None or not seen:
             return {}
-        seen = [c for c in self.channels if c.key == self.turning.key]
-        if not seen:
-            return {}
-        angle = self.turning.angle(seen[0].values)
-        return {
-            index: self.turning.shapes(np.interp(c.time, seen[0].time, angle))
-            for index, c in enumerate(self.channels)
-            if c.wander is not None
-        }
+        angle, out = self.turning.angle(seen[0].values), {}
+        for index, c in enumerate(self.channels):
+            if c.wander is not None:
+                shapes = self.turning.shapes(np.interp(c.time, seen[0].time, angle))
+                out[index] = shapes, replace(c, values=shapes).grouped
+        return out
 
     @property
     def begins(self) -> tuple[str, float]:
@@ -297,8 +296,11 @@ def node_step(rig: Rig, recording: Recording) -> float:
     if _only_turns(recording):
         # What a cubic through such nodes does not follow, no swing of a rigid body is either
         turn = _vertical_turn(recording)
-        period = _pendulum(rig) if turn is None else _period(turn)
-        return float(np.clip(period / SWING_NODES, WATCHED_NODE_STEP, LONGEST_NODE_STEP))
+        if turn is None:
+            wide, longest = _pendulum(rig) / SWING_NODES, WIDE_WATCHED_NODE_STEP
+        else:
+            wide, longest = _period(turn) / SWING_NODES, LONGEST_NODE_STEP
+        return float(np.clip(wide, WATCHED_NODE_STEP, longest))
     held = _force_step(rig, recording)
     if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
         return held

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.prediction import seen_of_pose
+from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import likeliest_sway, without_sway
 from rig_identification.quantity import with_interval
 
@@ -46,21 +46,31 @@ def pose_errors(fitted: Fitted) -> tuple[PoseError, ...]:
 
 def _errors(fitted: Fitted) -> Iterator[tuple[float, PoseError]]:
     """(gain in nats, the largest error) of each axis of each run."""
+    bench = fitted.problem.bench
     for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
-        seen = seen_of_pose(run, linearised.channel, linearised.axis, linearised.variance)
-        for rows, columns in seen:
-            channel = run.channels[linearised.channel[rows[0]]]
-            if channel.wander is None:
+        which, axis, variance = linearised.channel, linearised.axis, linearised.variance
+        for off in unseen_of(bench.rig, bench.unseen, run, which, axis, variance):
+            if not off.at_samples.shape[1]:
                 continue
-            std = channel.wander[channel.axes.index(int(linearised.axis[rows[0]]))]
-            left = linearised.plain[rows] / np.sqrt(linearised.variance[rows])
-            amounts = likeliest_sway(columns, left)
-            spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns + np.eye(columns.shape[1]))))
-            whitened = left[:, None].copy()
-            log_spread = without_sway(columns, whitened)
-            gain = 0.5 * float(left @ left - whitened[:, 0] @ whitened[:, 0]) - log_spread
+            left = linearised.plain[off.rows] / np.sqrt(variance[off.rows])
+            first = off.at_nodes.shape[1]
+            gain = _explained(off.seen, left) - _explained(off.seen[:, :first], left)
+            amounts = likeliest_sway(off.seen, left)[first:]
+            known = np.linalg.inv(off.seen.T @ off.seen + np.eye(off.seen.shape[1]))
             k = int(np.argmax(np.abs(amounts)))
-            yield gain, PoseError(channel.quantity, float(std * abs(amounts[k])), float(std * spread[k]))
+            std = float(np.max(off.at_samples[:, k]))
+            spread = float(np.sqrt(known[first + k, first + k]))
+            quantity = run.channels[off.channel].quantity
+            yield gain, PoseError(quantity, std * abs(float(amounts[k])), std * spread)
+
+
+def _explained(seen: Array, left: Array) -> float:
+    """Log likelihood (nats) that residuals ``left`` (m,) gain by shapes ``seen`` (m, n) of any amount."""
+    if not seen.shape[1]:
+        return 0.0
+    whitened = left[:, None].copy()
+    log_spread = without_sway(seen, whitened)
+    return 0.5 * float(left @ left - whitened[:, 0] @ whitened[:, 0]) - log_spread
 
 
 def pose_error_text(errors: tuple[PoseError, ...]) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.cautious import coherence, reweighted, solve_cautiously
+from rig_identification.estimate.cautious import once, reweighted, solve_cautiously
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
@@ -51,16 +51,8 @@ class Watched:
 
 
 def _tempered(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
-    """The same with residuals that follow the motion counted as one error each, fitted again.
-
-    Taken as many independent ones they would outweigh what a tape measure says of the rig, and bend it.
-    """
-    factor = np.sqrt(coherence(problem, evaluation))
-    runs = tuple(
-        replace(run, channels=tuple(replace(c, noise=factor * c.noise) for c in run.channels))
-        for run in problem.runs
-    )
-    mild = replace(problem, runs=runs)
+    """The same with residuals that follow the motion counted as one error each, fitted again."""
+    mild = once(problem, evaluation)
     return mild, solve(mild, evaluation.point, iterations=2 * STEPS, tolerance=0.1)[0]
 
 
