@@ -45,7 +45,7 @@ FOLLOWED, FOLLOWED_AT_WORST = 0.1, 1.0
 #: Runge-Kutta steps its frequency to 3e-5 and 2e-4.
 WATCHED_NODE_STEP, WIDE_WATCHED_NODE_STEP = 0.025, 0.04
 #: Nodes in a swing where a run is only watched. A Runge-Kutta step keeps the swing's frequency to
-#: (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6. And their longest spacing (s) where nothing but the turn
+#: (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6. Their longest spacing (s) where nothing but the turn
 #: about the vertical is measured: what the body does faster, rolling at some hertz, no such device feels.
 SWING_NODES, LONGEST_NODE_STEP = 64.0, 0.1
 #: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).

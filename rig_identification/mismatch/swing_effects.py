@@ -36,6 +36,8 @@ FIRST_VALUE = 0.02
 #: Part of the likeliest effect's gain that another one makes, to first order, before it is fitted, and by its
 #: fit before the body's rolling is asked beside it.
 COMPARABLE = 0.5
+#: Share of each piece that is looked at for how the body rolls, its beginning: a roll is faster than a swing.
+SHOWN = 0.5
 #: Times that the choice of effects is made anew about the fit of the one before.
 ROUNDS = 5
 
@@ -74,7 +76,8 @@ def _fitted(candidate: Candidate, problem: Problem, point: Point, steps: int) ->
 def _ways_of(trial: Trial) -> list[NDArray[np.float64]]:
     """Bodies that roll as the pieces may show with a trial's effect in the model."""
     problem, point = trial.problem, trial.evaluation.point
-    return ways_of_rolling(problem, problem.runs, point.theta, point.starts[0])
+    first = tuple(run.until(SHOWN * run.grid.duration) for run in problem.runs)
+    return ways_of_rolling(problem, first, point.theta, point.starts[0])
 
 
 def _rolling_otherwise(trial: Trial, ways: list[NDArray[np.float64]], budget: Budget) -> Trial:
