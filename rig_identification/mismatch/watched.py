@@ -15,7 +15,7 @@ from rig_identification.estimate.cautious import once, reweighted, solve_cautiou
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
-from rig_identification.estimate.identify import Ideal, Scores, judged
+from rig_identification.estimate.identify import Ideal, judged
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import in_pieces
@@ -142,7 +142,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
         mismatch = Mismatch("unexplained", text, tuple(findings), choice.rivals)
     hidden = {name for t in found for name in t.candidate.hides}
-    lost = hidden | set(testimony(*careful, _missed(fitted, after)))
+    lost = hidden | set(testimony(*careful, _missed(fitted)))
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
 
 
@@ -167,13 +167,18 @@ def _one_alone(
     return alone, _tempered(*solve_cautiously(replace(problem, runs=raw.runs), evaluation.point))
 
 
-def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:
-    """(device, quantity, axis) -> residual as a share of the signal, held out where a run is."""
-    held = {run.recording.name for run in (*fitted.holdout_runs, *fitted.lost)}
+def _missed(fitted: Fitted) -> dict[tuple[str, str, int], float]:
+    """(device, quantity, axis) -> residual as a share of the signal, held out where a run is.
+
+    By the motion alone: what a tracker is off by as the body turns predicts nothing of the body.
+    """
+    held = tuple(zip(fitted.holdout_runs, fitted.holdouts, strict=True))
     out: dict[tuple[str, str, int], float] = {}
-    for c in found.channels:
-        if c.recording in held or not held:
-            share = float(np.std(c.measured - c.predicted) / max(float(np.std(c.measured)), 1e-12))
-            key = (c.channel, c.quantity, 0 if c.axis is None else "xyz".index(c.axis))
-            out[key] = max(out.get(key, 0.0), share)
+    for run, linearised in held or zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
+        for index, c in enumerate(run.channels):
+            for k, axis in enumerate(c.axes):
+                left = linearised.plain[(linearised.channel == index) & (linearised.axis == axis)]
+                share = float(np.std(left) / max(float(np.std(c.grouped[:, k])), 1e-12))
+                key = (c.device, c.quantity, axis)
+                out[key] = max(out.get(key, 0.0), share)
     return out
