@@ -48,6 +48,9 @@ def _errors(fitted: Fitted) -> Iterator[tuple[float, PoseError]]:
     """(gain in nats, the largest error) of each axis of each run."""
     bench = fitted.problem.bench
     for run, linearised in zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
+        if np.any(linearised.noise.Q):
+            # Where a random wrench whitens the residuals nothing else is integrated out of them
+            continue
         which, axis, variance = linearised.channel, linearised.axis, linearised.variance
         for off in unseen_of(bench.rig, bench.unseen, run, which, axis, variance):
             if not off.at_samples.shape[1]:
