@@ -108,7 +108,7 @@ def element(answer: Identification, name: str) -> float:
 
 @pytest.mark.xfail(
     strict=False,
-    reason="0.0662 ± 0.0027 where the formula has 0.0642: 3.0 % off, within its interval; 1.8 % off before",
+    reason="0.0659 ± 0.0025 where the formula has 0.0641: 2.7 % off, within its interval",
 )
 def test_vertical_inertia_agrees_with_the_bifilar_formula(cradle: Answered) -> None:
     period = float(np.mean([yaw_period(r) for r in cradle.session.recordings]))
@@ -161,7 +161,14 @@ def test_what_damps_it_is_found(cradle: Answered) -> None:
     before, after = damping.evidence["holdout_error_before"], damping.evidence["holdout_error_after"]
     assert before is not None
     assert after is not None
-    assert after < before / 4.0
+    assert after < min(2.0, before / 3.0)
+
+
+def test_the_tracker_whose_markers_hide_is_told(cradle: Answered) -> None:
+    """Steps of a centimetre's fifth and of half a degree in its poses, at the same turn in every swing."""
+    tracker = next(f for f in cradle.answer.mismatch.findings if f.where.get("law") == "pose error")
+    assert 5e-4 < tracker.parameters["position_error"]["value"] < 4e-3  # type: ignore[operator]
+    assert 2e-3 < tracker.parameters["orientation_error"]["value"] < 1.5e-2  # type: ignore[operator]
 
 
 def cubic_moment(answer: Identification) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from rig_identification.mismatch.subsets import best_subset
+from rig_identification.mismatch.subsets import best_subset, gains_alone
 
 
 def posterior(design: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,3 +79,16 @@ def test_a_number_known_to_more_digits_than_there_are_stays() -> None:
     covariance[1:, 1:] = 0.04  # the other two are one, twice
     kept = best_subset(best, covariance, [[0], [1], [2]], [False] * 3, [1.0] * 3)
     assert kept == (0,)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_each_gains_alone_is_its_evidence_over_none(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    design = rng.standard_normal((60, 3)) @ (np.eye(3) + 0.5 * rng.standard_normal((3, 3)))
+    data = design @ [0.8, 0.0, -0.8] + rng.standard_normal(60)
+    gains = gains_alone(*posterior(design, data), [[0], [1, 2]], [False, False])
+    none = evidence(design[:, :0], data)
+    assert gains == pytest.approx([evidence(design[:, c], data) - none for c in ([0], [1, 2])], abs=1e-4)
+    signed = gains_alone(*posterior(design[:, :1], -data), [[0]], [True])
+    other = gains_alone(*posterior(design[:, :1], data), [[0]], [True])
+    assert sorted([signed[0], other[0]])[0] == -np.inf

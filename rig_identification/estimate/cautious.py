@@ -77,6 +77,19 @@ def coherence(problem: Problem, evaluation: Evaluation) -> float:
     return max(ratios)
 
 
+def once(problem: Problem, evaluation: Evaluation) -> Problem:
+    """The problem with what follows the motion counted as one error each, not as many small ones (coherence).
+
+    Taken as many independent ones they would outweigh what a tape measure says of the rig, and bend it.
+    """
+    factor = np.sqrt(coherence(problem, evaluation))
+    runs = tuple(
+        replace(run, channels=tuple(replace(c, noise=factor * c.noise) for c in run.channels))
+        for run in problem.runs
+    )
+    return replace(problem, runs=runs)
+
+
 def reweighted(problem: Problem, evaluation: Evaluation) -> Problem:
     """The problem with every channel's noise, and every rest mean's, as large as its residuals say."""
     factors = band_inflation(problem, evaluation)

@@ -8,10 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import AXES, Channel, Run, axis_name
 from rig_identification.estimate.lag import lagged
-from rig_identification.estimate.prediction import Linearised, seen_of_sway, smoothed
+from rig_identification.estimate.prediction import Linearised, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
 from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
+from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import likeliest_sway
 from rig_identification.result import BodyMotion, ChannelFit
 
@@ -32,22 +33,38 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
     corrections = node_corrections(linearised)
     places, own = problem.bench.parameters.places, problem.bench.parameters.device(theta)
     fits = []
-    sway = seen_of_sway(problem.bench, run, linearised.channel, linearised.variance)
+    off = _likeliest(problem, run, linearised)
     for index, channel in enumerate(run.channels):
         reading = linearised.readings[channel.device]
         nodes = reading.values[:, channel.columns]
         if corrections is not None:
             nodes = nodes + np.einsum("nij,nj->ni", reading.in_raw[:, channel.columns], corrections)
         nodes = lagged(run.grid.step, own[places.lag(channel.device)], nodes)
-        if index in sway:
-            rows, (shapes, seen) = linearised.channel == index, sway[index]
-            left = linearised.plain[rows] / np.sqrt(linearised.variance[rows])
-            nodes = nodes + (shapes @ likeliest_sway(seen, left))[:, None]
+        beside, itself = off.get(index, (0.0, 0.0))
         late = own[places.clock(channel.device)]
         each = np.arange(channel.time.size)
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
-        fits += _axes(run.recording.name, channel, np.asarray(value @ nodes), run.offset)
+        predicted = np.asarray(value @ (nodes + beside)) + itself
+        fits += _axes(run.recording.name, channel, predicted, run.offset)
     return fits
+
+
+def _likeliest(problem: Problem, run: Run, linearised: Linearised) -> dict[int, tuple[Array, Array]]:
+    """By channel the likeliest of what its samples are off by: (N, w) at the nodes, (n, w) at the samples."""
+    out: dict[int, tuple[Array, Array]] = {}
+    if np.any(linearised.noise.Q):
+        # Where a random wrench whitens the residuals nothing else is integrated out of them
+        return out
+    which, axis, variance = linearised.channel, linearised.axis, linearised.variance
+    for off in unseen_of(problem.bench.rig, problem.bench.unseen, run, which, axis, variance):
+        left = linearised.plain[off.rows] / np.sqrt(variance[off.rows])
+        amounts = likeliest_sway(off.seen, left)
+        width, first = run.channels[off.channel].width, off.at_nodes.shape[1]
+        empty = (np.zeros((run.grid.nodes, width)), np.zeros((off.at_samples.shape[0], width)))
+        beside, itself = out.setdefault(off.channel, empty)
+        beside[:, off.column] = off.at_nodes @ amounts[:first]
+        itself[:, off.column] = off.at_samples @ amounts[first:]
+    return out
 
 
 #: Hz. Smoother than a film; the slowest swing of a rig has many frames still.

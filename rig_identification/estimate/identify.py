@@ -37,12 +37,14 @@ from rig_identification.estimate.launch import REGRESSED, Launch, launch_states,
 from rig_identification.estimate.mixture import Bodies, mixture
 from rig_identification.estimate.observability import inertial_estimate, unsettled
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
+from rig_identification.estimate.pose_error_told import LAW, pose_error_text, pose_errors
 from rig_identification.estimate.prediction import Bench, model_at
 from rig_identification.estimate.rest_evidence import prepare_rest
 from rig_identification.estimate.rods import note_of, rods_of, with_rods
 from rig_identification.estimate.rolling import ways_of_rolling
 from rig_identification.estimate.scan import Scanned, scan
 from rig_identification.estimate.segments import (
+    PIECE_STEPS,
     FreePart,
     free_part,
     in_pieces,
@@ -63,6 +65,7 @@ from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.textbook import textbook_answers
+from rig_identification.estimate.tied_to_rig import tied_note
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -208,20 +211,29 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     return Start(problem, point, found.rest, held, notes, by_hand)
 
 
+#: First steps of a fit with another way of rolling: by then each is in its own valley.
+BEGUN = 4
+
+
 def _rolling(half: Problem, found: Scanned) -> Array:
     """The scan's vector fitted to short pieces, with the body rolling as it fits them best (rolling.py)."""
     guesses = (found.rest,) * len(half.rests)
     try:
-        parts, best, _ = solve_in_pieces(half, found.theta, found.rest, guesses)
+        parts, best = solve_in_pieces(half, found.theta, found.rest, guesses)
     except CannotBeFollowed:
         return found.theta
+    begun = []
     for theta in ways_of_rolling(parts, parts.runs, best.point.theta, found.rest):
         try:
-            _, other, _ = solve_in_pieces(half, theta, found.rest, guesses)
+            other_parts, other = solve_in_pieces(half, theta, found.rest, guesses, BEGUN)
         except CannotBeFollowed:
             continue
-        if len(other.runs) == len(best.runs) and other.cost < best.cost:
-            best = other
+        if len(other.runs) == len(best.runs):
+            begun.append((other_parts, other))
+    if begun:
+        likeliest, other = min(begun, key=lambda one: one[1].cost)
+        other, _ = solve(likeliest, other.point, iterations=PIECE_STEPS)
+        best = min(best, other, key=lambda one: one.cost)
     return best.point.theta
 
 
@@ -589,11 +601,16 @@ def compose(
     total = mixture(alone, rivals)
     wider = np.sqrt(np.diag(total.covariance) / np.diag(alone.covariance))
     notes = fitted.notes + ((CAUTION,) if careful else ())
+    errors = pose_errors(fitted)
+    if errors and not any(finding.where.get("law") == LAW for finding in mismatch.findings):
+        notes += (pose_error_text(errors),)
     if float(np.max(wider)) > WIDER:
         notes += (TIED,)
     total, headings = whichever_way(*basis, total)
     notes += (headings,) if headings else ()
     total = with_sources(total, *basis, loose)
+    tied = tied_note(total) if only_watched(fitted.problem) else None
+    notes += () if tied is None else (tied,)
     frame = session.rig.frame
     return Identification(
         total=total,

@@ -15,7 +15,8 @@ from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, r
 from rig_identification.estimate.lag import lagged, settling_cost, unsettled
 from rig_identification.estimate.parameters import ParameterSet
 from rig_identification.estimate.side_by_side import spare
-from rig_identification.estimate.unseen_sway import sway_shapes, without_sway
+from rig_identification.estimate.unseen import unseen_of
+from rig_identification.estimate.unseen_sway import without_sway
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors, work
 from rig_identification.model.constraints import rigid_jacobian
@@ -334,11 +335,10 @@ def linearise_run(
         deviation = np.sqrt(variance)
         columns /= deviation[:, None]
         log_spread = float(np.sum(np.log(deviation)))
-        for index, (_, seen) in seen_of_sway(bench, run, which, variance).items():
-            rows = which == index
-            beside = columns[rows]
-            log_spread += without_sway(seen, beside)
-            columns[rows] = beside
+        for off in unseen_of(bench.rig, bench.unseen, run, which, axis, variance):
+            beside = columns[off.rows]
+            log_spread += without_sway(off.seen, beside)
+            columns[off.rows] = beside
     if columns.size and not max(float(np.max(columns)), -float(np.min(columns))) < LARGEST:
         # Derivatives of motions that part from each other may grow beyond every number
         return None
@@ -362,26 +362,6 @@ def linearise_run(
         held,
         readings,
     )
-
-
-def seen_of_sway(
-    bench: Bench, run: Run, which: NDArray[np.int64], variance: Array
-) -> dict[int, tuple[Array, Array]]:
-    """What channels may read of a swing that nothing measures, by the channel's index.
-
-    which (m,): channel of each row; variance (m,): its noise. Returns for each (N, n) at the nodes, and
-    (rows of the channel, n) at its samples in units of their noise.
-    """
-    out: dict[int, tuple[Array, Array]] = {}
-    if not bench.unseen:
-        return out
-    for index, channel in enumerate(run.channels):
-        shapes = sway_shapes(bench.rig, run, channel)
-        if shapes is not None:
-            value, _ = run.samplers[index].at(0.0)
-            seen = np.asarray(value @ shapes) / np.sqrt(variance[which == index])[:, None]
-            out[index] = shapes, seen
-    return out
 
 
 def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array, Array, Array]:

@@ -33,6 +33,8 @@ LOWEST, HIGHEST = 1.1, 6.0
 STEPS, DOUBTED = 4, 1.0
 #: Ways of rolling that are worth a fit.
 TRIED = 3
+#: s of the first pieces that are looked at, whole pieces: rolling dies early.
+EARLY = 15.0
 
 
 def line_of_hinges(rig: Rig) -> Array | None:
@@ -86,12 +88,19 @@ def ways_of_rolling(problem: Problem, pieces: tuple[Run, ...], theta: Array, res
     line = line_of_hinges(problem.bench.rig)
     if line is None or not any(_tell(piece) for piece in pieces):
         return []
+    pieces = _early(pieces)
     span = float(np.mean([piece.grid.duration for piece in pieces]))
     bodies = _bodies(problem, theta, line, span)
     left = np.array(side_by_side(lambda body: _left(problem, pieces, body, rest), bodies))
     around = np.concatenate([[np.inf], left, [np.inf]])
     lowest = np.flatnonzero((left < around[:-2]) & (left <= around[2:]))
     return [bodies[k] for k in lowest[np.argsort(left[lowest])][:TRIED]]
+
+
+def _early(pieces: tuple[Run, ...]) -> tuple[Run, ...]:
+    """The first pieces, of EARLY seconds in all, one at least."""
+    ends = np.cumsum([piece.grid.duration for piece in pieces])
+    return pieces[: max(1, int(np.searchsorted(ends, EARLY, side="right")))]
 
 
 def _tell(piece: Run) -> bool:

@@ -8,7 +8,6 @@ It also tells in which pieces a run is free motion at all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.launch import launch_state, launch_states
 from rig_identification.estimate.noise import FITTED_SAMPLES
+from rig_identification.estimate.pose_error import turning_of
 from rig_identification.estimate.prediction import linearise_run
 from rig_identification.estimate.sampling import sample_noise_std
 from rig_identification.estimate.side_by_side import side_by_side
@@ -28,6 +28,8 @@ from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
 
+#: Steps of a fit of pieces to its end.
+PIECE_STEPS = 15
 #: Length of a piece, s: one to two periods of the slowest rigid mode of such rigs (0.37 Hz and up).
 PIECE = 4.0
 
@@ -71,12 +73,11 @@ def solve_in_pieces(
     theta: Array,
     rest: State,
     rest_guesses: tuple[State, ...],
-    notify: Callable[[int, float], None] | None = None,
-) -> tuple[Problem, Evaluation, bool]:
-    """The same problem with every run in pieces: (that problem, its evaluation, whether it converged)."""
+    iterations: int = PIECE_STEPS,
+) -> tuple[Problem, Evaluation]:
+    """The same problem with every run in pieces, and its evaluation after some steps."""
     parts, point = in_pieces(problem, theta, rest, rest_guesses)
-    evaluation, converged = solve(parts, point, iterations=15, notify=notify)
-    return parts, evaluation, converged
+    return parts, solve(parts, point, iterations=iterations)[0]
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,9 @@ class FreePart:
 #: A piece counts as driven where it fits so many times worse than the calm half of the run, both in units of
 #: noise and as a share of how far the body is from the run's middle.
 DRIVEN = 3.0
-#: Length of the pieces that are told apart, s.
+#: Length of the pieces that are told apart, s. Of a body that is only watched each is a whole swing at least:
+#: what a model lacks shows otherwise at each phase of a swing, and pieces of three quarters of one, of which
+#: every second begins alike, would seem to be driven in turn.
 SHORT_PIECE = 2.0
 
 
@@ -103,7 +106,7 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
     model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand. Nor
     is what noise leaves of a piece, however well others fit.
     """
-    cut = pieces_of(run, SHORT_PIECE / PIECE * long_enough(run, PIECE))
+    cut = pieces_of(run, long_enough(run, SHORT_PIECE, swings=1.0))
     errors = np.full(len(cut), np.inf)
     swing = _swing(run, cut)
     for i, piece in enumerate(cut):
@@ -160,9 +163,14 @@ def with_noise_of_swing(run: Run) -> Run:
             return sample_noise_std(c.time, c.values, 0.25 * period)
         return beside_a_swing(c.time, c.values, period)
 
-    return replace(
-        run,
-        channels=tuple(
-            replace(c, noise=np.maximum(c.noise, heard(c))) if c.noise_estimated else c for c in run.channels
-        ),
-    )
+    channels = tuple(_louder(c, heard(c)) if c.noise_estimated else c for c in run.channels)
+    turned = [c for c in channels if c.device == "mocap" and c.quantity == "orientation"]
+    turning = turning_of(turned[0].key, turned[0].values) if turned else None
+    return replace(run, channels=channels, turning=turning)
+
+
+def _louder(channel: Channel, heard: Array) -> Channel:
+    """The channel as noisy as ``heard`` (w,); what a tracker adds to a moment's noise goes with the pose."""
+    noise = np.maximum(channel.noise, heard)
+    wander = np.sqrt(noise**2 - channel.noise**2) if channel.device == "mocap" else None
+    return replace(channel, noise=noise, wander=wander)

@@ -46,11 +46,11 @@ def _between(power: Array, line: int) -> float:
     return float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
-def long_enough(run: Run, seconds: float) -> float:
-    """``seconds``, or what some swings take where a run measures neither force nor acceleration."""
+def long_enough(run: Run, seconds: float, swings: float = SWINGS) -> float:
+    """``seconds``, or what so many swings take where a run measures neither force nor acceleration."""
     if any(c.quantity in FORCES for c in run.channels):
         return seconds
-    return max(seconds, min(SWINGS * swing_period(run), run.grid.duration))
+    return max(seconds, min(swings * swing_period(run), run.grid.duration))
 
 
 def beside_a_swing(time: Array, values: Array, period: float) -> Array:

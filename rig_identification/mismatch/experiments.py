@@ -50,6 +50,7 @@ _EXPERIMENTS = {
     "external_force": "repeat the run: a push does not come again at the same instant",
     "unknown": "repeat at another amplitude, and at two frequencies",
     "unknown held end": _TURNED,
+    "unknown pose error": "add a camera, or turn the marker frame on the body: where the error is then tells",
     "unknown hold against rolling": "hang the body on single points, and repeat",
     "unknown turn that softens": "repeat with small turns alone, and with a plate of known size hung beside",
     "unknown torsion of the cables": "repeat with the body turned slowly, and with swivels in the cables",

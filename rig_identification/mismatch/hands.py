@@ -12,6 +12,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.mismatch.findings import written
+from rig_identification.mismatch.trial import NORMAL_95
 from rig_identification.quantity import plain_figure
 from rig_identification.recording import Recording
 from rig_identification.result import Finding
@@ -64,10 +65,11 @@ def nobody_held(fitted: Fitted) -> bool:
 
 
 def hand_finding(fitted: Fitted) -> Finding | None:
-    """Finding ``external_force`` for the parts that were cut off; None where there are none.
+    """Finding ``external_force`` for the parts that were cut off; None where none were, or no force shows.
 
     The force is what the marker's path asks of a pendulum of the cables' length beyond gravity; its
-    std is what the same measure reads in the free part, where no one pushes.
+    std is what the same measure reads in the free part, where no one pushes. What does not exceed that, or
+    where no place was measured, tells of no force: the parts stand in the notes alone.
     """
     if not fitted.held_parts:
         return None
@@ -90,6 +92,8 @@ def hand_finding(fitted: Fitted) -> Finding | None:
             free = time > max(part.end for part in mine)
             calm.append(force[free])
     level = float(np.sqrt(np.mean(np.concatenate(calm) ** 2))) if calm else peak
+    if peak <= NORMAL_95 * level:
+        return None
     times = [{"recording": p.recording, "start": p.start, "end": p.end} for p in fitted.held_parts]
     told = "; ".join(f"{p.recording} {p.start:.1f} to {p.end:.1f} s" for p in fitted.held_parts)
     return Finding(

@@ -40,21 +40,34 @@ def best_subset(
     """
     chosen: tuple[int, ...] = ()
     highest = -np.inf
-    everything = range(len(groups))
     for count in range(len(groups) + 1):
-        for kept in combinations(everything, count):
+        for kept in combinations(range(len(groups)), count):
             if any(a in kept and b in kept for a, b in apart or ()):
                 continue
-            out = [i for k in everything if k not in kept for i in groups[k]]
-            value, score = best, 0.0
-            if out:
-                held = covariance[np.ix_(out, out)] + np.diag(FLOOR * (np.diag(covariance)[out] + FLOOR))
-                pull = np.linalg.solve(held, best[out])
-                value = best - covariance[:, out] @ pull
-                score = -0.5 * float(best[out] @ pull) - 0.5 * float(np.linalg.slogdet(held)[1])
-            if any(positive[k] and value[groups[k][0]] <= 0.0 for k in kept):
-                continue
-            score -= sum(penalties[k] for k in kept)
+            score = _score(best, covariance, groups, positive, kept) - sum(penalties[k] for k in kept)
             if score > highest:
                 chosen, highest = kept, score
     return chosen
+
+
+def gains_alone(
+    best: Array, covariance: Array, groups: list[list[int]], positive: list[bool]
+) -> tuple[float, ...]:
+    """Log evidence that each group of numbers gains by itself over none of them. Arguments as above."""
+    none = _score(best, covariance, groups, positive, ())
+    return tuple(_score(best, covariance, groups, positive, (k,)) - none for k in range(len(groups)))
+
+
+def _score(
+    best: Array, covariance: Array, groups: list[list[int]], positive: list[bool], kept: tuple[int, ...]
+) -> float:
+    """Log evidence of a subset less a constant; minus infinity where a positive number would not be."""
+    out = [i for k in range(len(groups)) if k not in kept for i in groups[k]]
+    value, score = best, 0.0
+    if out:
+        held = covariance[np.ix_(out, out)] + np.diag(FLOOR * (np.diag(covariance)[out] + FLOOR))
+        pull = np.linalg.solve(held, best[out])
+        value = best - covariance[:, out] @ pull
+        score = -0.5 * float(best[out] @ pull) - 0.5 * float(np.linalg.slogdet(held)[1])
+    absurd = any(positive[k] and value[groups[k][0]] <= 0.0 for k in kept)
+    return -np.inf if absurd else score

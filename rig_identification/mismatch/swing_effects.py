@@ -22,7 +22,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended, free_without
-from rig_identification.mismatch.subsets import best_subset
+from rig_identification.mismatch.subsets import best_subset, gains_alone
 from rig_identification.mismatch.trial import Trial, finished, log_evidence
 
 Notify = Callable[[str, float], None]
@@ -33,8 +33,11 @@ DAMPERS = ("hinge_damping", "hinge_friction", "air_drag")
 STEPS = 8
 #: Where a hypothesis starts, in units of its prior's std.
 FIRST_VALUE = 0.02
-#: Part of the likeliest effect's gain that another one makes before the body's rolling is asked beside it.
+#: Part of the likeliest effect's gain that another one makes, to first order, before it is fitted, and by its
+#: fit before the body's rolling is asked beside it.
 COMPARABLE = 0.5
+#: Share of each piece that is looked at for how the body rolls, its beginning: a roll is faster than a swing.
+SHOWN = 0.5
 #: Times that the choice of effects is made anew about the fit of the one before.
 ROUNDS = 5
 
@@ -73,23 +76,33 @@ def _fitted(candidate: Candidate, problem: Problem, point: Point, steps: int) ->
 def _ways_of(trial: Trial) -> list[NDArray[np.float64]]:
     """Bodies that roll as the pieces may show with a trial's effect in the model."""
     problem, point = trial.problem, trial.evaluation.point
-    return ways_of_rolling(problem, problem.runs, point.theta, point.starts[0])
+    first = tuple(run.until(SHOWN * run.grid.duration) for run in problem.runs)
+    return ways_of_rolling(problem, first, point.theta, point.starts[0])
 
 
 def _rolling_otherwise(trial: Trial, ways: list[NDArray[np.float64]], budget: Budget) -> Trial:
     """The trial with its body rolling in one of several ways, where that is likelier."""
+    if budget.spent() or not ways:
+        return trial
+    begun = [otherwise for otherwise in (_begun(trial, way) for way in ways) if otherwise is not None]
+    if not begun:
+        return trial
+    # Within a few steps each is in its own valley: the way to the bottom is worth going in the likeliest one
+    likeliest = max(begun, key=log_evidence)
+    again = _fitted(trial.candidate, trial.problem, likeliest.point, 2 * STEPS)
+    return trial if again is None or again.evidence <= trial.evidence else again
+
+
+def _begun(trial: Trial, way: NDArray[np.float64]) -> Evaluation | None:
+    """First steps of the trial with its body rolling in another ``way``; None where it cannot be followed."""
     problem, point = trial.problem, trial.evaluation.point
-    best = trial
-    for way in ways:
-        if budget.spent():
-            break
-        theta = with_body(problem.bench.parameters, point.theta, way)
-        starts = launch_states(problem.bench, problem.runs, theta, point.starts[0])
+    theta = with_body(problem.bench.parameters, point.theta, way)
+    starts = launch_states(problem.bench, problem.runs, theta, point.starts[0])
+    try:
         start = replace(point, theta=theta, starts=starts)
-        again = _fitted(trial.candidate, problem, start, 2 * STEPS)
-        if again is not None and again.evidence > best.evidence:
-            best = again
-    return best
+        return solve(problem, start, iterations=STEPS // 2, tolerance=0.5)[0]
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
 
 
 def _weighed(raw: Problem, problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
@@ -156,13 +169,10 @@ class Choice:
         )
 
 
-def _each_kind(tried: list[Trial], base: float) -> list[Trial]:
-    """The likeliest trial of each effect that gains a part of what the likeliest of all does."""
-    best: dict[str, Trial] = {}
-    for trial in tried:
-        best.setdefault(trial.candidate.effect, trial)
+def _comparable(tried: list[Trial], base: float) -> list[Trial]:
+    """The trials that gain a part of what the likeliest of all does."""
     enough = COMPARABLE * (tried[0].evidence - base)
-    return [trial for trial in best.values() if trial.evidence - base > enough]
+    return [trial for trial in tried if trial.evidence - base > enough]
 
 
 def damped(
@@ -186,15 +196,16 @@ def damped(
     def told(share: float) -> Callable[[str], None]:
         return lambda stage: notify(stage, share)
 
-    tried = _better(base, evaluation, dampers, count, told(0.2), budget)
+    kinds = _best_of_each_kind(base, evaluation, dampers)
+    tried = _better(base, evaluation, kinds, count, told(0.2), budget)
     if not tried:
         return None
     notify("search: how it rolls", 0.3)
     # Fitted to a body that rolls as it does not, what stops a swing is bent to next to nothing
     # At which frequency it rolls does not depend on what damps it
     ways = [] if budget.spent() else _ways_of(tried[0])
-    kinds = _each_kind(tried, log_evidence(evaluation))
-    first = max((_rolling_otherwise(trial, ways, budget) for trial in kinds), key=lambda t: t.evidence)
+    near = _comparable(tried, log_evidence(evaluation))
+    first = max((_rolling_otherwise(trial, ways, budget) for trial in near), key=lambda t: t.evidence)
     held = _better(first.problem, first.evaluation, holds, count, told(0.35), budget)
     others = tuple(c for c in candidates if c not in holds)
     choice = Choice((first.candidate,), (), others, tuple(tried))
@@ -225,13 +236,13 @@ def _settled(
         if again.labels in seen:
             break
         seen.add(again.labels)
-        changed, fitted = _exchanged(base, problem, evaluation, choice, again)
+        changed, fitted = exchanged(base, problem, evaluation, choice, again)
         choice = again
         problem, evaluation = _weighed(raw, changed, fitted)
     return choice, problem, evaluation
 
 
-def _exchanged(
+def exchanged(
     base: Problem, problem: Problem, evaluation: Evaluation, before: Choice, after: Choice
 ) -> tuple[Problem, Evaluation]:
     """A fit with one choice made one with another. base: without any effect."""
@@ -245,17 +256,32 @@ def _exchanged(
     return changed, fitted
 
 
-def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
-    """Which effects belong into the model, by what all at once promise about a fit with some (subsets.py).
+@dataclass(frozen=True)
+class _AllAtOnce:
+    """What one linearisation with all candidates free says of them (subsets.py)."""
 
-    base: without any effect; problem, evaluation: the fit with those of ``choice``.
+    best: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    groups: list[list[int]]
+    positive: list[bool]
+
+
+def _all_at_once(
+    base: Problem,
+    problem: Problem,
+    evaluation: Evaluation,
+    holding: tuple[Candidate, ...],
+    candidates: tuple[Candidate, ...],
+) -> _AllAtOnce | None:
+    """All ``candidates`` free about a fit, beside what is ``holding``; None where it cannot be followed.
+
+    base: without any effect; problem, evaluation: the fit, with some of them perhaps.
     """
-    candidates = choice.others
-    wide = extended(replace(base, runs=problem.runs), (*choice.holding, *candidates))
+    wide = extended(replace(base, runs=problem.runs), (*holding, *candidates))
     point = carried(wide, problem, evaluation.point)
     full = evaluate(wide, point)
     if full is None:
-        return choice
+        return None
     parameters = wide.bench.parameters
     groups = [[parameters.index_of(p.name) for p in c.parameters] for c in candidates]
     mine = [i for group in groups for i in group]
@@ -263,11 +289,45 @@ def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: C
     index = np.concatenate([rest, np.array(mine, dtype=rest.dtype)])
     covariance = invert_information(full.information[np.ix_(index, index)])
     best = point.theta[mine] + (covariance @ full.gradient[index])[rest.size :]
-    kept = best_subset(
+    return _AllAtOnce(
         best,
         covariance[rest.size :, rest.size :],
         [[mine.index(i) for i in group] for group in groups],
         [c.positive > 0 for c in candidates],
+    )
+
+
+def _best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Candidate]) -> list[Candidate]:
+    """Of each effect the candidate that gains most to first order, where that comes near the best of all.
+
+    base, evaluation: a fit without any effect.
+    """
+    found = _all_at_once(base, base, evaluation, (), tuple(dampers))
+    if found is None:
+        return dampers
+    gains = gains_alone(found.best, found.covariance, found.groups, found.positive)
+    order = sorted(range(len(dampers)), key=lambda k: -gains[k])
+    best: dict[str, Candidate] = {}
+    for k in order:
+        if gains[k] > COMPARABLE * gains[order[0]]:
+            best.setdefault(dampers[k].effect, dampers[k])
+    return list(best.values())
+
+
+def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
+    """Which effects belong into the model, by what all at once promise about a fit with some (subsets.py).
+
+    base: without any effect; problem, evaluation: the fit with those of ``choice``.
+    """
+    candidates = choice.others
+    found = _all_at_once(base, problem, evaluation, choice.holding, candidates)
+    if found is None:
+        return choice
+    kept = best_subset(
+        found.best,
+        found.covariance,
+        found.groups,
+        found.positive,
         [needed_gain(c, len(candidates)) for c in candidates],
         [
             (i, k)

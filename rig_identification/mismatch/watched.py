@@ -11,25 +11,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.cautious import coherence, reweighted, solve_cautiously
+from rig_identification.estimate.cautious import once, reweighted, solve_cautiously
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
-from rig_identification.estimate.identify import Ideal, Scores, judged
+from rig_identification.estimate.identify import Ideal, judged
 from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.budget import Budget
+from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hands import hand_finding, nobody_held
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
-from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Notify, damped
+from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Choice, Notify, damped, exchanged
 from rig_identification.mismatch.threads import physics_of_pendulums
-from rig_identification.mismatch.trial import Trial, log_evidence, mass_of, may_be_none
+from rig_identification.mismatch.tracker_error import tracker_findings
+from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, may_be_none
 from rig_identification.result import ELEMENTS, Mismatch
 
 #: How many times as long pieces are: friction shows against the amplitude, which must change within one.
@@ -49,16 +51,8 @@ class Watched:
 
 
 def _tempered(problem: Problem, evaluation: Evaluation) -> tuple[Problem, Evaluation]:
-    """The same with residuals that follow the motion counted as one error each, fitted again.
-
-    Taken as many independent ones they would outweigh what a tape measure says of the rig, and bend it.
-    """
-    factor = np.sqrt(coherence(problem, evaluation))
-    runs = tuple(
-        replace(run, channels=tuple(replace(c, noise=factor * c.noise) for c in run.channels))
-        for run in problem.runs
-    )
-    mild = replace(problem, runs=runs)
+    """The same with residuals that follow the motion counted as one error each, fitted again."""
+    mild = once(problem, evaluation)
     return mild, solve(mild, evaluation.point, iterations=2 * STEPS, tolerance=0.1)[0]
 
 
@@ -120,12 +114,17 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     choice, problem, parted = answer
     notify("weighing each channel by its residual", 0.65)
     careful = _tempered(*solve_cautiously(replace(problem, runs=raw.runs), parted.point))
+    if not _sure(choice.effects, careful):
+        # Each may be none beside the others: the one that shows most has to be there by itself
+        choice, careful = _one_alone(raw, parts, choice, careful)
+        if not _sure(choice.effects, careful):
+            return None
     notify("search: whole runs", 0.75)
     heavy, point = _begun_whole(ideal, *careful)
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
     fitted = _scored(ideal, heavy, whole, converged)
     evidence_of_all = log_evidence(whole)
-    found = _told([Trial(c, heavy, whole, evidence_of_all, True) for c in choice.effects], careful)
+    found = [Trial(c, heavy, whole, evidence_of_all, True) for c in _sure(choice.effects, careful)]
     after, verdict = judged(fitted)
     told = estimates(fitted.problem, fitted.evaluation, spread=careful[1])
     evidence = evidence_of(found_ideal, fitted, after.holdout)
@@ -133,6 +132,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     hand = hand_finding(ideal)
     if hand is not None and not (verdict.verdict == "none" and nobody_held(fitted)):
         findings.append(hand)
+    findings += tracker_findings(fitted, evidence)
     named = effects_of(findings)
     if verdict.verdict == "none":
         mismatch = Mismatch(
@@ -142,26 +142,43 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
         mismatch = Mismatch("unexplained", text, tuple(findings), choice.rivals)
     hidden = {name for t in found for name in t.candidate.hides}
-    lost = hidden | set(testimony(*careful, _missed(fitted, after)))
+    lost = hidden | set(testimony(*careful, _missed(fitted)))
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
 
 
-def _told(found: list[Trial], careful: tuple[Problem, Evaluation]) -> list[Trial]:
-    """What is told of the effects in the model: no amount that may as well be none, beside one that may not.
+def _sure(effects: tuple[Candidate, ...], careful: tuple[Problem, Evaluation]) -> tuple[Candidate, ...]:
+    """Effects in the model that may not as well be none. careful: the fit whose intervals are told."""
+    trials = [Trial(c, *careful, log_evidence(careful[1]), True) for c in effects]
+    return tuple(t.candidate for t in trials if not may_be_none(t))
 
-    careful: the cautious fit, whose intervals are told.
+
+def _one_alone(
+    raw: Problem, base: Problem, choice: Choice, careful: tuple[Problem, Evaluation]
+) -> tuple[Choice, tuple[Problem, Evaluation]]:
+    """The cautious fit with the one effect in the model whose amount is the most std from none.
+
+    raw: pieces with the sensors' own noise; base: without any effect.
     """
-    sure = [t for t in found if not may_be_none(replace(t, problem=careful[0], evaluation=careful[1]))]
-    return sure or found
+    seen = in_stds(Trial(choice.effects[0], *careful, 0.0))
+    clearest = max(choice.effects, key=lambda c: max(abs(seen[p.name]) for p in c.parameters))
+    chosen, holding = ((clearest,), ()) if clearest in choice.chosen else ((), (clearest,))
+    alone = replace(choice, chosen=chosen, holding=holding)
+    problem, evaluation = exchanged(base, *careful, choice, alone)
+    return alone, _tempered(*solve_cautiously(replace(problem, runs=raw.runs), evaluation.point))
 
 
-def _missed(fitted: Fitted, found: Scores) -> dict[tuple[str, str, int], float]:
-    """(device, quantity, axis) -> residual as a share of the signal, held out where a run is."""
-    held = {run.recording.name for run in (*fitted.holdout_runs, *fitted.lost)}
+def _missed(fitted: Fitted) -> dict[tuple[str, str, int], float]:
+    """(device, quantity, axis) -> residual as a share of the signal, held out where a run is.
+
+    By the motion alone: what a tracker is off by as the body turns predicts nothing of the body.
+    """
+    held = tuple(zip(fitted.holdout_runs, fitted.holdouts, strict=True))
     out: dict[tuple[str, str, int], float] = {}
-    for c in found.channels:
-        if c.recording in held or not held:
-            share = float(np.std(c.measured - c.predicted) / max(float(np.std(c.measured)), 1e-12))
-            key = (c.channel, c.quantity, 0 if c.axis is None else "xyz".index(c.axis))
-            out[key] = max(out.get(key, 0.0), share)
+    for run, linearised in held or zip(fitted.problem.runs, fitted.evaluation.runs, strict=True):
+        for index, c in enumerate(run.channels):
+            for k, axis in enumerate(c.axes):
+                left = linearised.plain[(linearised.channel == index) & (linearised.axis == axis)]
+                share = float(np.std(left) / max(float(np.std(c.grouped[:, k])), 1e-12))
+                key = (c.device, c.quantity, axis)
+                out[key] = max(out.get(key, 0.0), share)
     return out
