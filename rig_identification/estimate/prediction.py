@@ -34,8 +34,9 @@ START_UNIT = 0.01
 BARE, STEPPED = 46, 6
 #: What a smoothed run takes, in columns: measured, 14.
 SMOOTHED = 14
-#: No whitened residual or derivative is larger, so that the squares of all of them are numbers.
-LARGEST = 1e120
+#: No whitened residual or derivative is larger: beyond it the last digit of a parameter, 1e-15 of its prior's
+#: std, moves a prediction by the std of its noise, and no fit means anything.
+LARGEST = 1e15
 
 
 @dataclass(frozen=True)
