@@ -38,6 +38,7 @@ def both() -> tuple[Identification, np.ndarray]:
     return _answer(AIR)
 
 
+@pytest.mark.long
 def test_air_beside_a_turned_inclinometer_is_told(both: tuple[Identification, np.ndarray]) -> None:
     found, deviation = both
     assert [f.effect for f in found.mismatch.findings] == ["inclinometer_offset", "air_added_mass"]
@@ -46,6 +47,7 @@ def test_air_beside_a_turned_inclinometer_is_told(both: tuple[Identification, np
     assert np.max(np.abs(deviation)) < 3.5
 
 
+@pytest.mark.long
 def test_each_of_them_bears_its_own_evidence(both: tuple[Identification, np.ndarray]) -> None:
     """Without the turn all is contradicted; without the air no residual shows it, and less is lost."""
     turn, air = (f.evidence["log_likelihood_gain"] for f in both[0].mismatch.findings)
