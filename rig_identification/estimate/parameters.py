@@ -92,6 +92,8 @@ class Parameter:
 #: Numbers and axes of the devices that are no load cell, in the order in which they stand.
 _SIZES = {"imu": devices.IMU_SIZE, "inclinometer": devices.INCLINOMETER_SIZE, "mocap": devices.MOCAP_SIZE}
 _AXES = {"imu": 6, "inclinometer": 2, "mocap": 0}
+#: Quantities of the IMU that a soft mount changes, each by its own resonance.
+MOUNTED = ("specific_force", "angular_rate")
 
 
 @dataclass(frozen=True)
@@ -194,7 +196,7 @@ class DeviceLayout:
     @property
     def size(self) -> int:
         """Length of the flat array."""
-        return self.lag("exciter") + 1
+        return self.mount(MOUNTED[-1]) + 2
 
     def clock(self, device: str) -> int:
         """Entry of a device's clock offset."""
@@ -208,6 +210,10 @@ class DeviceLayout:
         """Entry of a device's time constant (s) as a first-order low-pass."""
         order = (*self.cables, "imu", "inclinometer", "mocap", "exciter")
         return self.exciter_clock + 1 + len(self.cables) + order.index(device)
+
+    def mount(self, quantity: str) -> int:
+        """Entry of the IMU's mount as a ``quantity`` shows it: 1/w^2 (s^2), then damping (mounting.py)."""
+        return self.lag("exciter") + 1 + 2 * MOUNTED.index(quantity)
 
 
 #: What shifts the exciter's force in time, alike to first order (prediction.drive).

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, random_wrench
 from rig_identification.estimate.lag import lagged, settling_cost, unsettled
-from rig_identification.estimate.parameters import ParameterSet
+from rig_identification.estimate.mounting import mounted, mounted_change
+from rig_identification.estimate.parameters import MOUNTED, ParameterSet
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
@@ -190,14 +191,20 @@ def _channel_rows(
     step, groups = run.grid.step, channel.node.size
     value, slope = run.samplers[index].at(late)
     reads = channel.columns
-    values = lagged(step, tau, reading.values[:, reads])
+    soft = parameters.places.mount(channel.quantity) if channel.quantity in MOUNTED else None
+    mount = (0.0, 0.0) if soft is None else (float(own[soft]), float(own[soft + 1]))
+
+    def as_shown(values: Array) -> Array:
+        return lagged(step, tau, mounted(step, *mount, values))
+
+    values = as_shown(reading.values[:, reads])
     _, _, motion_H, motion_D, motion_J = motion.derivatives
     in_raw = reading.in_raw[:, reads]
     raw = _in_use(in_raw)
     in_raw = in_raw[:, :, raw]
     nodes, width = in_raw.shape[:2]
     known, starts = (0 if start_only else parameters.size), motion_J.shape[2] - in_physics.shape[0]
-    total = lagged(step, tau, (in_raw @ motion_J[:, raw]).reshape(nodes, -1))
+    total = as_shown((in_raw @ motion_J[:, raw]).reshape(nodes, -1))
     in_motion = (value @ total).reshape(groups * width, -1)
     H = in_raw[node] @ motion_H[node[:, None], raw]
     D = in_raw[node] @ motion_D[node[:, None], raw]
@@ -213,13 +220,17 @@ def _channel_rows(
     # Of a device's numbers most are certain
     free = np.flatnonzero((entries >= first) & (entries < first + reading.in_device.shape[2]))
     in_used = reading.in_device[:, reads][:, :, entries[free] - first]
-    own_map = value @ lagged(step, tau, in_used.reshape(nodes, -1))
+    own_map = value @ as_shown(in_used.reshape(nodes, -1))
     own_map = own_map.reshape(groups, width, free.size)
     for k, i in enumerate(free):
         out[:, :, 1 + columns[i]] += scale[i] * own_map[:, :, k]
     for i in np.flatnonzero((entries == clock) | (entries == lag)):
         shown = values if entries[i] == clock else lagged(step, tau, values)
         out[:, :, 1 + columns[i]] -= scale[i] * (slope @ shown)
+    if soft is not None and np.any(of_mount := (entries == soft) | (entries == soft + 1)):
+        changes = mounted_change(step, *mount, reading.values[:, reads])
+        for i in np.flatnonzero(of_mount):
+            out[:, :, 1 + columns[i]] += scale[i] * (value @ lagged(step, tau, changes[entries[i] - soft]))
     return out, H, D
 
 

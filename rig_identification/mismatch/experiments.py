@@ -30,6 +30,7 @@ _EXPERIMENTS = {
     "stays, a tilt changes sides",
     "clock_offset": "knock on the body at rest: every device has to show it at the same instant",
     "sensor_lag": "shake at two frequencies: a lag weakens the higher one, a late clock does not",
+    "sensor_resonance": "knock on the body beside the IMU: a soft mount rings, a bolted one does not",
     "cable_length": _TURNED,
     "cable_edge": "clamp the cables where they leave the ceiling, and repeat",
     "hinge_position": _TURNED,

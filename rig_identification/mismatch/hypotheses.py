@@ -23,6 +23,7 @@ from rig_identification.mismatch.rig_errors import rig_errors
 from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.sensor_errors import sensor_errors
 from rig_identification.mismatch.shared_errors import shared_errors
+from rig_identification.mismatch.soft_mount import soft_mounts
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3
@@ -42,6 +43,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
         *rig_errors(rig, parameters),
         *mount_errors(rig, parameters),
         *shared_errors(rig, parameters),
+        *soft_mounts(parameters, {c.quantity for run in problem.runs for c in run.channels}),
         *left_out_physics(rig, parameters, mass),
     ]
     # What is slow has several descriptions and one place

@@ -1,0 +1,54 @@
+"""An IMU on a soft mount: foam, rubber, a long bracket. It resonates, and shows motion larger than it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rig_identification.estimate.estimates import Estimates
+from rig_identification.estimate.parameters import Parameter, ParameterSet
+from rig_identification.mismatch.candidate import Candidate, Told
+
+#: Plausible 1/w^2 (s^2) of a mount, of 6 Hz, and its damping ratio, of rubber.
+SOFTNESS, DAMPING, DAMPING_RANGE = (2.0 * np.pi * 6.0) ** -2, 0.08, 0.05
+#: Readings in words, by quantity.
+_SHOWN = {"specific_force": "acceleration", "angular_rate": "rate"}
+
+
+def soft_mounts(parameters: ParameterSet, channels: set[str]) -> list[Candidate]:
+    """The IMU's mount as its accelerometer shows it, as its gyroscope does, and both."""
+    seen = [q for q in _SHOWN if q in channels]
+    return [
+        *(_mount(parameters, (q,)) for q in seen),
+        *([_mount(parameters, tuple(seen))] if seen[1:] else []),
+    ]
+
+
+def _mount(parameters: ParameterSet, quantities: tuple[str, ...]) -> Candidate:
+    soft, damped = [], []
+    for quantity in quantities:
+        entry, stem = parameters.places.mount(quantity), f"imu.mount.{quantity}"
+        soft.append(Parameter(f"{stem}.softness", "s^2", 0.0, SOFTNESS, "device", entry, bounded=False))
+        damped.append(
+            Parameter(f"{stem}.damping", "1", DAMPING, DAMPING_RANGE, "device", entry + 1, bounded=False)
+        )
+
+    def told(found: Estimates) -> Told:
+        out: Told = {}
+        for quantity, k, z in zip(quantities, soft, damped, strict=True):
+            word = _SHOWN[quantity]
+            own = found.following(lambda k: float(1.0 / (2.0 * np.pi * np.sqrt(max(k, 1e-12)))), k.name)
+            out[f"frequency_{word}"] = (*own, "Hz")
+            out[f"damping_ratio_{word}"] = (*found.of(z.name), "1")
+        lowest = min((v for name, v in out.items() if name.startswith("frequency")), key=lambda v: v[0])
+        return {"frequency": lowest, **out}
+
+    parts = " and ".join("accelerometer" if q == "specific_force" else "gyroscope" for q in quantities)
+    return Candidate(
+        "sensor_resonance",
+        (*soft, *damped),
+        f"The IMU's {parts} shows a resonance of its mount, at {{value}}: motion looks larger than it is.",
+        "Bolt the IMU to the frame without foam or rubber.",
+        {"channel": "imu", "axis": None},
+        positive=len(quantities),
+        tell=told,
+    )

@@ -1,0 +1,90 @@
+"""A device on a soft mount shows what a mass on a spring does whose foot is shaken."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from test_estimate_prediction import recorded
+from test_model_rigs import thesis_case_14
+
+from rig_identification.estimate.first_guess import rest_of
+from rig_identification.estimate.identify import pose_problem
+from rig_identification.estimate.mounting import mounted, mounted_change
+from rig_identification.estimate.prediction import linearise_run, model_at
+from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.soft_mount import soft_mounts
+
+STEP = 0.01
+
+
+def shaken(t: np.ndarray | float) -> np.ndarray:
+    """What the body does: two slow swings that begin from rest."""
+    t = np.asarray(t)
+    return np.asarray(
+        (1.0 - np.exp(-t)) * (np.sin(2.0 * np.pi * 0.6 * t) + 0.4 * np.sin(2.0 * np.pi * 2.1 * t))
+    )
+
+
+@pytest.mark.parametrize("frequency", [5.0, 8.0, 14.0])
+def test_it_shows_what_the_equation_of_motion_says(frequency: float) -> None:
+    """Also with more damping or less; 14 Hz is followed by nodes 10 ms apart."""
+    w, z, time = 2.0 * np.pi * frequency, 0.1, np.arange(0.0, 12.0, STEP)
+
+    def law(t: float, x: np.ndarray) -> list[float]:
+        # x: stretch of the mount and its rate; the device's acceleration is u + stretch's
+        return [x[1], -2.0 * z * w * x[1] - w * w * x[0] - float(shaken(t))]
+
+    found = solve_ivp(law, (0.0, 12.0), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=2e-3)
+    device = -2.0 * z * w * found.y[1] - w * w * found.y[0]
+    shown = mounted(STEP, w**-2, z, shaken(time)[:, None])[:, 0]
+    own = np.std(device - shaken(time))
+    assert own > 0.003
+    assert np.std(shown - device) < 0.05 * own
+
+
+def test_a_stiff_mount_shows_the_motion_itself_and_a_soft_one_more() -> None:
+    time = np.arange(0.0, 10.0, STEP)
+    swing = np.sin(2.0 * np.pi * 1.0 * time)[:, None]
+    assert mounted(STEP, 0.0, 0.1, swing) is swing
+    for frequency in (6.0, 12.0, 40.0):
+        shown = mounted(STEP, (2.0 * np.pi * frequency) ** -2, 0.1, swing)[500:]
+        assert np.max(shown) == pytest.approx(1.0 / (1.0 - frequency**-2.0), rel=3e-3)
+
+
+def test_derivatives_of_a_run_are_those_of_its_residuals() -> None:
+    problem, theta, _ = pose_problem(recorded(thesis_case_14(), duration=3.0)[0])
+    quantities = {c.quantity for run in problem.runs for c in run.channels}
+    *_, both = soft_mounts(problem.bench.parameters, quantities)
+    assert len(both.parameters) == 4
+    wide = extended(problem, (both,))
+    parameters, run = wide.bench.parameters, wide.runs[0]
+    there = parameters.converted(theta, problem.bench.parameters)
+    columns = [parameters.index_of(p.name) for p in both.parameters]
+    there[columns[:2]] = 0.7, 0.5
+    start = rest_of(model_at(parameters, there))
+
+    def residual(theta: np.ndarray) -> np.ndarray:
+        found = linearise_run(wide.bench, run, theta, start)
+        assert found is not None
+        return found.residual
+
+    found = linearise_run(wide.bench, run, there, start)
+    assert found is not None
+    for column in columns:
+        step = np.zeros(parameters.size)
+        step[column] = 1e-4
+        numeric = (residual(there + step) - residual(there - step)) / 2e-4
+        own = found.jacobian[:, column]
+        assert np.linalg.norm(numeric) > 1e-3
+        np.testing.assert_allclose(numeric, -own, atol=2e-3 * np.abs(own).max())
+
+
+def test_its_change_is_its_derivative() -> None:
+    values = shaken(np.arange(0.0, 6.0, STEP))[:, None]
+    for k in (-2e-4, 6e-4):
+        in_k, in_damping = mounted_change(STEP, k, 0.1, values)
+        near = (mounted(STEP, k + 1e-7, 0.1, values) - mounted(STEP, k - 1e-7, 0.1, values)) / 2e-7
+        np.testing.assert_allclose(in_k, near, rtol=1e-3, atol=1e-3 * np.abs(near).max())
+        near = (mounted(STEP, k, 0.1001, values) - mounted(STEP, k, 0.0999, values)) / 2e-4
+        np.testing.assert_allclose(in_damping, near, rtol=1e-3, atol=1e-3 * max(np.abs(near).max(), 1e-9))
