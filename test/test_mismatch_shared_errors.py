@@ -28,7 +28,8 @@ def test_what_it_moves_is_what_its_derivative_says(session: Session) -> None:
     problem, theta, _ = pose_problem(session)
     candidates = tuple(shared_errors(session.rig, problem.bench.parameters))
     assert {c.parameters[0].name for c in candidates} == {
-        "cables.length", "cables.edge_radius", "load_cells.gain", "imu.gyroscope_scale", "imu.accelerometer_scale",
+        "cables.length", "cables.edge_radius", "load_cells.gain",
+        "imu.gyroscope_scale", "imu.accelerometer_scale",
     }  # fmt: skip
     wide = extended(problem, candidates).bench.parameters
     there = wide.converted(theta, problem.bench.parameters)
