@@ -37,7 +37,9 @@ def answer(monkeypatch: pytest.MonkeyPatch, session: Session, identification: Id
     seen: dict[str, object] = {}
 
     def install(outcome: object) -> None:
-        def identify(given: Session, *, progress: object = None, work: float = 0.0) -> Identification:
+        def identify(
+            given: Session, *, progress: object = None, work: float = 0.0, watcher: object = None
+        ) -> Identification:
             assert given is session
             seen["work"] = work
             if isinstance(outcome, BaseException):
