@@ -306,7 +306,7 @@ def install(monkeypatch: pytest.MonkeyPatch, *faults: SetupFault) -> None:
         warnings = left_aside(raw, raw, topics).warnings
         return Examined(Examination(raw.name, topics, (), faults, warnings), raw)
 
-    monkeypatch.setattr("rig_identification.check.examine.examine", examine)
+    monkeypatch.setattr("rig_identification.identification.examine", examine)
 
 
 def test_check_of_a_session_on_disk(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
