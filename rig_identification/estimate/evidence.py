@@ -40,13 +40,12 @@ SELDOM = 1.5
 #: Root mean square error of that cubic, in units of one sample's noise, up to which it follows: of a whole
 #: run, and of its worst second, in which 0.8 is still chance.
 FOLLOWED, FOLLOWED_AT_WORST = 0.1, 1.0
-#: Shortest and longest node spacing where a run is only watched: no device follows more than swing and
-#: rolling. Cubics through such nodes hold a pose to 1e-4 and 5e-4 of its amplitude at 1.5 Hz, and
-#: Runge-Kutta steps its frequency to 3e-5 and 2e-4.
-WATCHED_NODE_STEP, WIDE_WATCHED_NODE_STEP = 0.025, 0.04
-#: Nodes in a swing where a run is only watched. A Runge-Kutta step keeps the swing's frequency to
-#: (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6. Their longest spacing (s) where nothing but the turn
-#: about the vertical is measured: what the body does faster, rolling at some hertz, no such device feels.
+#: Node spacing where a run is only watched: no device follows more than the swing itself, whose pose a
+#: cubic through such nodes holds to 1e-4 at 1.5 Hz.
+WATCHED_NODE_STEP = 0.025
+#: Nodes in a swing where nothing but the turn about the vertical is measured, and their longest spacing (s).
+#: A Runge-Kutta step keeps the swing's frequency to (2 pi / 64)^4 / 120 = 8e-7, a cubic its angle to 2e-6.
+#: What the body does faster, rolling at some hertz, no such device feels.
 SWING_NODES, LONGEST_NODE_STEP = 64.0, 0.1
 #: Samples this close to a run's ends are left out, so that a clock offset moves none across the end (s).
 MARGIN = 0.02
@@ -297,10 +296,8 @@ def node_step(rig: Rig, recording: Recording) -> float:
         # What a cubic through such nodes does not follow, no swing of a rigid body is either
         turn = _vertical_turn(recording)
         if turn is None:
-            wide, longest = _pendulum(rig) / SWING_NODES, WIDE_WATCHED_NODE_STEP
-        else:
-            wide, longest = _period(turn) / SWING_NODES, LONGEST_NODE_STEP
-        return float(np.clip(wide, WATCHED_NODE_STEP, longest))
+            return WATCHED_NODE_STEP
+        return float(np.clip(_period(turn) / SWING_NODES, WATCHED_NODE_STEP, LONGEST_NODE_STEP))
     held = _force_step(rig, recording)
     if held > SELDOM * WIDE_NODE_STEP and _all_follow(rig, recording, held):
         return held
@@ -322,12 +319,6 @@ def _vertical_turn(recording: Recording) -> Series | None:
         kept = np.isfinite(series.values[:, z])
         found.append(Series(series.time[kept], series.values[kept][:, [z]]))
     return found[0] if len(found) == 1 and found[0].time.size >= 16 else None
-
-
-def _pendulum(rig: Rig) -> float:
-    """Period (s) of a point on the rig's cables: a body swings so on parallel ones, and faster on others."""
-    length = min(cable.length for cable in rig.cables)
-    return float(2.0 * np.pi * np.sqrt(length / rig.gravity))
 
 
 def _period(series: Series) -> float:

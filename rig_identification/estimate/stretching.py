@@ -34,7 +34,7 @@ BOUNCE, DAMPING = 20.0, 0.03
 #: Stiffnesses, in the usual one, from which a fit to rest starts: wire, rope, webbing, rubber.
 STIFFNESSES = (0.1, 1.0, 10.0, 0.01)
 #: Stiffest cables that are told from rigid ones, in the usual stiffness: beyond it each step takes minutes.
-STIFFEST = 9.0
+STIFFEST = 18.0
 #: Nats by which cables that stretch explain rest better, from which they do: of a rig with rigid cables
 #: chance brings two more numbers as much once in e^10 sessions (half a chi-square of two).
 GAINED = 10.0
