@@ -211,10 +211,6 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     return Start(problem, point, found.rest, held, notes, by_hand)
 
 
-#: First steps of a fit with another way of rolling: by then each is in its own valley.
-BEGUN = 4
-
-
 def _rolling(half: Problem, found: Scanned) -> Array:
     """The scan's vector fitted to short pieces, with the body rolling as it fits them best (rolling.py)."""
     guesses = (found.rest,) * len(half.rests)
@@ -222,18 +218,13 @@ def _rolling(half: Problem, found: Scanned) -> Array:
         parts, best = solve_in_pieces(half, found.theta, found.rest, guesses)
     except CannotBeFollowed:
         return found.theta
-    begun = []
     for theta in ways_of_rolling(parts, parts.runs, best.point.theta, found.rest):
         try:
-            other_parts, other = solve_in_pieces(half, theta, found.rest, guesses, BEGUN)
+            _, other = solve_in_pieces(half, theta, found.rest, guesses)
         except CannotBeFollowed:
             continue
-        if len(other.runs) == len(best.runs):
-            begun.append((other_parts, other))
-    if begun:
-        likeliest, other = min(begun, key=lambda one: one[1].cost)
-        other, _ = solve(likeliest, other.point, iterations=PIECE_STEPS)
-        best = min(best, other, key=lambda one: one.cost)
+        if len(other.runs) == len(best.runs) and other.cost < best.cost:
+            best = other
     return best.point.theta
 
 
