@@ -44,7 +44,6 @@ from rig_identification.estimate.rods import note_of, rods_of, with_rods
 from rig_identification.estimate.rolling import ways_of_rolling
 from rig_identification.estimate.scan import Scanned, scan
 from rig_identification.estimate.segments import (
-    PIECE_STEPS,
     FreePart,
     free_part,
     in_pieces,
