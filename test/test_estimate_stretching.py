@@ -84,14 +84,17 @@ def test_four_that_do_not_stretch_stay_as_they_are() -> None:
 
 
 def test_a_run_on_six_cables_is_fitted_and_the_stretch_is_told_first() -> None:
-    """The stiffness within a tenth: in so short a run, not shaken, its own interval is too narrow."""
+    """Within 3.5 std: of ten numbers one lies farther once in two hundred sessions."""
     run = RunSpec("run_1", 4.0, Pulled(np.array([400.0, 500.0, 0.0]), np.array([1.6, 0.0, -0.5])))
     session, _ = simulate_session(hung(6, SOFT, (run,)), np.random.default_rng(4))
     fitted = fit_session(session)
     parameters = fitted.problem.bench.parameters
     theta = fitted.evaluation.point.theta
     assert fitted.converged
-    assert abs(np.log(parameters.named(theta)[STIFFNESS] / 1.5e6)) < 0.1
+    covariance = np.linalg.inv(fitted.evaluation.information)
+    stiff = parameters.index_of(STIFFNESS)
+    away = np.log(parameters.named(theta)[STIFFNESS] / 1.5e6)
+    assert abs(away) < 3.5 * np.sqrt(covariance[stiff, stiff])
     total = inertial_estimate(fitted.problem, fitted.evaluation)
     # In four seconds, not shaken, it hardly turns: of its inertia next to nothing is known
     assert {"m", "cx", "cy"}.isdisjoint(total.unobservable)

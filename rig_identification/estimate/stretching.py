@@ -31,10 +31,10 @@ Array = NDArray[np.float64]
 
 #: Frequency (Hz) at which a body bounces on cables of the usual stiffness, and their damping ratio.
 BOUNCE, DAMPING = 20.0, 0.03
-#: Stiffnesses, in the usual one, from which a fit to rest starts: wire, rope, webbing, rubber.
-STIFFNESSES = (0.1, 1.0, 10.0, 0.01)
-#: Stiffest cables that are told from rigid ones, in the usual stiffness: beyond it each step takes minutes.
-STIFFEST = 18.0
+#: Stiffnesses, in the usual one, from which a fit to rest starts: they span what is free of it.
+STIFFNESSES = (0.1, 1.0, 10.0)
+#: ... and of rubber cords, which are asked where no stiffness of rope explains rest.
+RUBBER = 0.01
 #: Nats by which cables that stretch explain rest better, from which they do: of a rig with rigid cables
 #: chance brings two more numbers as much once in e^10 sessions (half a chi-square of two).
 GAINED = 10.0
@@ -52,8 +52,13 @@ def usual_stiffness(rig: Rig, mass: float) -> float:
     return mass * (2.0 * np.pi * BOUNCE) ** 2 * length / len(rig.cables)
 
 
-def stretching(rig: Rig, model: RigModel, mass: float) -> tuple[RigModel, tuple[Parameter, ...]]:
-    """The model with cables that stretch, all alike; its parameters are their EA and their time constant."""
+def stretching(
+    rig: Rig, model: RigModel, mass: float, *, rubber: bool = False
+) -> tuple[RigModel, tuple[Parameter, ...]]:
+    """The model with cables that stretch, all alike; its parameters are their EA and their time constant.
+
+    rubber: of cords that the weight stretches by a tenth, and not of rope, wire or webbing.
+    """
     entries = [layout.cable_offset(i) for i in range(model.cables)]
 
     def shared(
@@ -68,11 +73,14 @@ def stretching(rig: Rig, model: RigModel, mass: float) -> tuple[RigModel, tuple[
         can_slacken=np.zeros(model.cables, dtype=np.bool_),
     )
     damping = 2.0 * DAMPING / (2.0 * np.pi * BOUNCE)
-    # Within three std: from rubber that the weight stretches to twice its length to what is as good as rigid
-    softest, stiffest = mass * rig.gravity / model.cables, STIFFEST * usual_stiffness(rig, mass)
-    middle, spread = float(np.sqrt(softest * stiffest)), float(np.log(stiffest / softest)) / 6.0
+    # Rubber, within three std: from twice its length under the weight to a tenth of what is usual
+    softest, stiffest = mass * rig.gravity / model.cables, 0.1 * usual_stiffness(rig, mass)
+    cords = float(np.sqrt(softest * stiffest)), float(np.log(stiffest / softest)) / 6.0
+    rope = 0.5 * usual_stiffness(rig, mass), 1.2
     return elastic, (
-        shared(STIFFNESS, "N", middle, spread, layout.AXIAL_STIFFNESS, bounded=True),
+        # Within three std: from 0.014 times what is usual, webbing on which a car sinks by decimetres, to
+        # eighteen times, beyond which nothing tells it from rigid and each step takes minutes
+        shared(STIFFNESS, "N", *(cords if rubber else rope), layout.AXIAL_STIFFNESS, bounded=True),
         shared(TIME_CONSTANT, "s", damping, 1.0, layout.AXIAL_DAMPING),
     )
 
@@ -99,7 +107,12 @@ def where_they_stretch(problem: Problem, theta: Array) -> Stretched | None:
     if soft is None or not any(c.quantity == "tension" for rest in rests for c in rest.channels):
         # Which cable carries what no other device feels
         return None
-    rigid, elastic = _at_rest(problem, theta, rests), _softest(soft, rests)
+    rigid, elastic = _at_rest(problem, theta, rests), _softest(soft, rests, STIFFNESSES)
+    if elastic is None or _square(elastic) > EXPLAINED:
+        cords = with_stretch(problem, theta, rubber=True)
+        other = None if cords is None else _softest(cords, rests, (RUBBER,))
+        if cords is not None and other is not None and (elastic is None or other.cost < elastic.cost):
+            soft, elastic = cords, other
     if elastic is None:
         return None
     gain = None if rigid is None else rigid.cost - elastic.cost
@@ -108,13 +121,13 @@ def where_they_stretch(problem: Problem, theta: Array) -> Stretched | None:
     return replace(soft, theta=elastic.point.theta, gain=gain)
 
 
-def with_stretch(problem: Problem, theta: Array) -> Stretched | None:
+def with_stretch(problem: Problem, theta: Array, *, rubber: bool = False) -> Stretched | None:
     """The problem with cables that stretch by a usual stiffness; None where something stretches already."""
     parameters = problem.bench.parameters
     if not np.all(parameters.model.modes == layout.RIGID):
         return None
     mass = float(parameters.elements(theta)[0])
-    model, own = stretching(problem.bench.rig, parameters.model, mass)
+    model, own = stretching(problem.bench.rig, parameters.model, mass, rubber=rubber)
     wide = replace(parameters, model=model).having(own)
     soft = replace(problem, bench=replace(problem.bench, parameters=wide))
     return Stretched(soft, wide.converted(theta, parameters), None)
@@ -127,14 +140,16 @@ def _means_of_runs(problem: Problem) -> tuple[RestEvidence, ...]:
     return tuple(coarsened(rest) for rest in rests if rest.channels)
 
 
-def _softest(soft: Stretched, rests: tuple[RestEvidence, ...]) -> Evaluation | None:
+def _softest(
+    soft: Stretched, rests: tuple[RestEvidence, ...], shares: tuple[float, ...]
+) -> Evaluation | None:
     """The best fit to rest of all stiffnesses that are tried first; None where there is none."""
     parameters = soft.problem.bench.parameters
     index = parameters.index_of(STIFFNESS)
     own = parameters.free[index - INERTIAL]
     usual = usual_stiffness(soft.problem.bench.rig, float(parameters.elements(soft.theta)[0]))
     best: Evaluation | None = None
-    for share in STIFFNESSES:
+    for share in shares:
         theta = soft.theta.copy()
         theta[index] = own.position(share * usual)
         found = _at_rest(soft.problem, theta, rests)

@@ -70,7 +70,9 @@ def _written(candidate: Candidate) -> set[tuple[str, int]]:
     """Entries of the model or a device that a candidate writes; one that builds has its own."""
     if candidate.build is not None:
         return set()
-    return {(q.kind, entry) for q in candidate.parameters for entry in q.written}
+    return {
+        (q.kind, entry) for q in candidate.parameters for entry in (*q.written, *(e for e, _ in q.shifts))
+    }
 
 
 def count_of(candidates: list[Candidate]) -> int:

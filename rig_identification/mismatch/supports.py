@@ -36,8 +36,8 @@ CEILING_FREQUENCY = 10.0
 #: Damping ratio of a probe: it starts unloaded, and what that costs is over after a twentieth of a second.
 PROBE_DAMPING = 1.0
 
-#: Parts of the usual stiffness at which cables that stretch are begun: rubber, webbing, rope, wire.
-STRETCHES = (0.003, 0.03, 0.3, 3.0)
+#: Parts of the usual stiffness at which cables that stretch are begun: webbing, rope, wire.
+STRETCHES = (0.03, 0.3, 3.0)
 
 
 def gives_way(model: RigModel) -> bool:
@@ -130,7 +130,7 @@ def yielding_like(rig: Rig, model: RigModel, compliance: float) -> float:
 
 
 def stiffnesses(rig: Rig, mass: float) -> list[float]:
-    """(4,) EA, N, at which a fit of cables that stretch is begun: none finds its way from one to the next."""
+    """(3,) EA, N, at which a fit of cables that stretch is begun: none finds its way from one to the next."""
     return [share * usual_stiffness(rig, mass) for share in STRETCHES]
 
 
