@@ -39,7 +39,7 @@ def test_no_number_of_what_was_found_is_written_over(problem: Problem) -> None:
         wide = extended(extended(problem, (found,)), tuple(beside)).bench.parameters
         there = wide.converted(theta, alone)
         for p in found.parameters:
-            entries = [p.index, *p.also]
+            entries = [*p.written, *(entry for entry, _ in p.shifts)]
             after, before = (getattr(s, p.kind)(t) for s, t in ((wide, there), (alone, theta)))
             assert np.array_equal(after[entries], before[entries]), (found.label, p.name)
 
