@@ -242,12 +242,10 @@ def assert_pushed(finding: Finding, recording: str, start: float, end: float) ->
     assert times["end"] > start
 
 
-#: Those that the gate runs: two devices, one number of the rig, and a hose. A law stands in
-#: test_search_laws.py, an event in test_mismatch_pulse.py, what gives way in test_estimate_stretching.py.
+#: Those that the gate runs: two devices, and one number of the rig. A law stands in test_search_laws.py, an
+#: event in test_mismatch_pulse.py, a hose in test_mismatch_steady_pull.py.
 QUICK = {
-    "clock_and_inclinometer",
     "cable_too_long",
-    "hose_that_pulls",
     "inclinometer_and_cell",
 }
 #: Those that do not come out, and what came instead.

@@ -62,6 +62,7 @@ def test_a_body_less_its_rotor_moves_as_the_body_that_held_it(session):
     assert np.max(np.abs(unsettled.runs[0].residual - before.runs[0].residual)) > 10.0
 
 
+@pytest.mark.long
 def test_what_the_thesis_left_out_is_found_and_the_inertia_comes_back():
     found = examine(load_case(14), 1)
     assert found.verdict == "explained"
