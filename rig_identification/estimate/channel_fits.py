@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import AXES, Channel, Run, axis_name
-from rig_identification.estimate.lag import lagged
-from rig_identification.estimate.prediction import Linearised, smoothed
+from rig_identification.estimate.prediction import Linearised, device_shows, smoothed
 from rig_identification.estimate.rest_evidence import RestEvidence, RestLinearised
 from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
@@ -39,7 +38,7 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
         nodes = reading.values[:, channel.columns]
         if corrections is not None:
             nodes = nodes + np.einsum("nij,nj->ni", reading.in_raw[:, channel.columns], corrections)
-        nodes = lagged(run.grid.step, own[places.lag(channel.device)], nodes)
+        nodes = device_shows(run.grid.step, channel, own, places, nodes)
         beside, itself = off.get(index, (0.0, 0.0))
         late = own[places.clock(channel.device)]
         each = np.arange(channel.time.size)

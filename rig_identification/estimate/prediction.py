@@ -14,7 +14,7 @@ from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, random_wrench
 from rig_identification.estimate.lag import lagged, settling_cost, unsettled
 from rig_identification.estimate.mounting import mounted, mounted_change
-from rig_identification.estimate.parameters import MOUNTED, ParameterSet
+from rig_identification.estimate.parameters import MOUNTED, DeviceLayout, ParameterSet
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
@@ -191,11 +191,10 @@ def _channel_rows(
     step, groups = run.grid.step, channel.node.size
     value, slope = run.samplers[index].at(late)
     reads = channel.columns
-    soft = parameters.places.mount(channel.quantity) if channel.quantity in MOUNTED else None
-    mount = (0.0, 0.0) if soft is None else (float(own[soft]), float(own[soft + 1]))
+    soft, mount = mount_of(channel, own, parameters.places)
 
     def as_shown(values: Array) -> Array:
-        return lagged(step, tau, mounted(step, *mount, values))
+        return device_shows(step, channel, own, parameters.places, values)
 
     values = as_shown(reading.values[:, reads])
     _, _, motion_H, motion_D, motion_J = motion.derivatives
@@ -232,6 +231,20 @@ def _channel_rows(
         for i in np.flatnonzero(of_mount):
             out[:, :, 1 + columns[i]] += scale[i] * (value @ lagged(step, tau, changes[entries[i] - soft]))
     return out, H, D
+
+
+def mount_of(channel: Channel, own: Array, places: DeviceLayout) -> tuple[int | None, tuple[float, float]]:
+    """First entry of the mount that a channel is seen through, and its numbers there; None: it is rigid."""
+    if channel.quantity not in MOUNTED:
+        return None, (0.0, 0.0)
+    first = places.mount(channel.quantity)
+    return first, (float(own[first]), float(own[first + 1]))
+
+
+def device_shows(step: float, channel: Channel, own: Array, places: DeviceLayout, values: Array) -> Array:
+    """What a device shows of ``values`` (N, c) at nodes ``step`` s apart, through its mount and its lag."""
+    _, mount = mount_of(channel, own, places)
+    return lagged(step, float(own[places.lag(channel.device)]), mounted(step, *mount, values))
 
 
 def longest_step(run: Run) -> float:

@@ -9,13 +9,12 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, ParameterSet
 from rig_identification.mismatch.candidate import Candidate, Told
-from rig_identification.mismatch.rig_errors import LENGTH_RANGE
-from rig_identification.mismatch.sensor_errors import RANGE, freed
+from rig_identification.mismatch.rig_errors import LENGTH_RANGE, error_of
+from rig_identification.mismatch.sensor_errors import RANGE, freed, turned
 from rig_identification.rig import Rig
 
 _AGAIN = "Measure its place again."
@@ -40,7 +39,11 @@ def mount_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
             subject = f"The {end} hinge of {{channel}}"
             stem = f"{cable.name}.{end}_point"
             out += _placed(parameters, "hinge_position", stem, LENGTH_RANGE, subject, where)
-    return [*out, *_exciter_along_one_axis(parameters), *_turned_exciter(rig, parameters)]
+    out += _exciter_along_one_axis(parameters)
+    if rig.exciter is not None:
+        orientation = rig.exciter.orientation
+        out += turned(parameters, "exciter", "The exciter", "exciter_misalignment", orientation)
+    return out
 
 
 def _placed(
@@ -59,10 +62,7 @@ def _placed(
 
     def off(estimates: Estimates) -> Told:
         errors: Told = {
-            f"error_{a}": (
-                *estimates.following(partial(_less, nominal[p.name]), p.name),
-                "m",
-            )
+            f"error_{a}": error_of(p.name, p.nominal)(estimates)["error"]
             for a, p in zip(AXES, found, strict=True)
         }
         size = estimates.following(partial(_distance, *nominal.values()), *nominal)
@@ -70,10 +70,6 @@ def _placed(
 
     sentence = f"{subject} sits {{value}} from where it is described."
     return [Candidate(effect, found, sentence, _AGAIN, {**where, "axis": None}, tell=off)]
-
-
-def _less(nominal: float, value: float) -> float:
-    return value - nominal
 
 
 def _distance(x: float, y: float, z: float, *at: float) -> float:
@@ -92,40 +88,7 @@ def _exciter_along_one_axis(parameters: ParameterSet) -> list[Candidate]:
                     f"The exciter sits {{value}} from where it is described, along the body's {a} axis.",
                     _AGAIN,
                     {"channel": "exciter", "axis": a},
-                    tell=partial(_along, p.name, p.nominal),
+                    tell=error_of(p.name, p.nominal),
                 )
             )
     return out
-
-
-def _along(name: str, nominal: float, estimates: Estimates) -> Told:
-    return {"error": (*estimates.following(partial(_less, nominal), name), "m")}
-
-
-def _turned_exciter(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
-    names = [f"exciter.orientation.{a}" for a in AXES]
-    own = [freed(parameters, name, RANGE["orientation"]) for name in names]
-    found = tuple(p for p in own if p is not None)
-    if rig.exciter is None or len(found) < len(AXES):
-        return []
-    to_exciter = Rotation.from_quat(rig.exciter.orientation).inv()
-
-    def about(axis: int, *turn: float) -> float:
-        return float(to_exciter.apply(turn)[axis])
-
-    def angle(estimates: Estimates) -> Told:
-        turns: Told = {
-            f"angle_{a}": (*estimates.following(partial(about, i), *names), "rad") for i, a in enumerate(AXES)
-        }
-        return {"angle": max(turns.values(), key=lambda told: abs(told[0])), **turns}
-
-    return [
-        Candidate(
-            "exciter_misalignment",
-            found,
-            "The exciter is turned by {value} against its description.",
-            "Measure its orientation again; the angles about its own axes are given.",
-            {"channel": "exciter", "axis": None},
-            tell=angle,
-        )
-    ]

@@ -52,7 +52,7 @@ def rig_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
                     "{channel} is longer than described by {value}.",
                     "Measure the cable between its hinge centres under load.",
                     {"channel": cable.name, "axis": None},
-                    tell=_error(length.name, cable.length),
+                    tell=error_of(length.name, cable.length),
                 )
             )
         for end, point in (("ceiling", cable.ceiling_point), ("body", cable.body_point)):
@@ -66,13 +66,15 @@ def rig_errors(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
                             f"The {end} hinge of {{channel}} sits {{value}} off its description, along {a}.",
                             "Measure the hinge's place again.",
                             {"channel": cable.name, "end": end, "axis": a},
-                            tell=_error(p.name, float(point[i])),
+                            tell=error_of(p.name, float(point[i])),
                         )
                     )
     return [*out, *_level(rig, parameters)]
 
 
-def _error(name: str, nominal: float) -> Callable[[Estimates], Told]:
+def error_of(name: str, nominal: float) -> Callable[[Estimates], Told]:
+    """Tells a length less what the description says of it."""
+
     def told(found: Estimates) -> Told:
         return {"error": (*found.following(lambda value: value - nominal, name), "m")}
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
 
 #: Plausible range (std of the prior once freed) of each error.
 RANGE = {
@@ -118,31 +122,43 @@ def _imu(rig: Rig, parameters: ParameterSet) -> list[Candidate]:
             "Measure its place again.",
             where,
         )
-    turned = [freed(parameters, f"imu.orientation.{a}", RANGE["orientation"]) for a in AXES]
-    if rig.imu is not None and all(p is not None for p in turned):
-        to_imu = Rotation.from_quat(rig.imu.orientation).inv()
-
-        def about(axis: int, *turn: float) -> float:
-            return float(to_imu.apply(turn)[axis])
-
-        def angle(found: Estimates) -> Told:
-            names = [f"imu.orientation.{a}" for a in AXES]
-            own: Told = {
-                f"angle_{a}": (*found.following(partial(about, i), *names), "rad") for i, a in enumerate(AXES)
-            }
-            return {"angle": max(own.values(), key=lambda told: abs(told[0])), **own}
-
-        out.append(
-            Candidate(
-                "imu_misalignment",
-                tuple(p for p in turned if p is not None),
-                "The IMU is turned by {value} against its description.",
-                "Measure its orientation again; the angles about its own axes are given.",
-                {"channel": "imu", "axis": None},
-                tell=angle,
-            )
-        )
+    if rig.imu is not None:
+        out += turned(parameters, "imu", "The IMU", "imu_misalignment", rig.imu.orientation)
     return out
+
+
+def turned(
+    parameters: ParameterSet, device: str, subject: str, effect: str, orientation: Array
+) -> list[Candidate]:
+    """A device that is turned against its description; nothing where no turn of it is doubted.
+
+    orientation (4,): described quaternion, device into body.
+    """
+    names = [f"{device}.orientation.{a}" for a in AXES]
+    own = tuple(p for name in names if (p := freed(parameters, name, RANGE["orientation"])) is not None)
+    if len(own) < len(AXES):
+        return []
+    to_device = Rotation.from_quat(orientation).inv()
+
+    def about(axis: int, *turn: float) -> float:
+        return float(to_device.apply(turn)[axis])
+
+    def angle(found: Estimates) -> Told:
+        turns: Told = {
+            f"angle_{a}": (*found.following(partial(about, i), *names), "rad") for i, a in enumerate(AXES)
+        }
+        return {"angle": max(turns.values(), key=lambda told: abs(told[0])), **turns}
+
+    return [
+        Candidate(
+            effect,
+            own,
+            f"{subject} is turned by {{value}} against its description.",
+            "Measure its orientation again; the angles about its own axes are given.",
+            {"channel": device, "axis": None},
+            tell=angle,
+        )
+    ]
 
 
 def _inclinometer(parameters: ParameterSet) -> list[Candidate]:
