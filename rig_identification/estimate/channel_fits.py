@@ -30,7 +30,8 @@ def node_corrections(linearised: Linearised) -> Array | None:
 def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -> list[ChannelFit]:
     """One :class:`ChannelFit` an axis of each channel of a run, sample by sample."""
     corrections = node_corrections(linearised)
-    places, own = problem.bench.parameters.places, problem.bench.parameters.device(theta)
+    parameters = problem.bench.of(run).parameters
+    places, own = parameters.places, parameters.device(theta)
     fits = []
     off = _likeliest(problem, run, linearised)
     for index, channel in enumerate(run.channels):

@@ -48,7 +48,7 @@ def _followed(
     problem: Problem, run: Run, theta: Array, start: State, held: Array
 ) -> tuple[State, Array] | None:
     """Start and noise (N, 6) of one run. A step that leaves more than before is tried at half its length."""
-    bench, noise = problem.bench, problem.extra_noise
+    bench, noise = problem.bench.of(run), problem.extra_noise
     model = model_at(bench.parameters, theta)
 
     def at(start: State, held: Array) -> Linearised | None:

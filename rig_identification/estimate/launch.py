@@ -104,7 +104,7 @@ def _square(evaluation: Evaluation) -> float:
 
 def tracked(bench: Bench, run: Run, theta: Array, rest: State, doubted: float = 0.0) -> Track | None:
     """A run tracked from a start that may be anywhere near rest. doubted: see :func:`launch_state`."""
-    physics = bench.parameters.physics(theta)
+    physics = bench.of(run).parameters.physics(theta)
     size = float(np.max(extent(bench.rig)))
     noise = wrench_noise(physics[layout.INERTIAL], bench.rig.gravity, size, run.grid.step, SHARE)
     start = launch_state(bench, run, theta, rest, noise, doubted)
@@ -132,6 +132,7 @@ def launch_state(
     be off, in tolerances (fit_start). Cables that stretch begin stretched as far as rigid ones pull: from
     elsewhere the body bounces, and a millimetre is a tonne.
     """
+    bench = bench.of(run)
     soft = bench.parameters.model.modes != layout.RIGID
     if np.any(soft) and redundant(bench.rig):
         # Of rigid cables no motion keeps them all: from where those that stretch let the body hang

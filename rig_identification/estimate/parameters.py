@@ -45,6 +45,19 @@ CLOCK = "clock"
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """A part of a recording."""
+
+    recording: str
+    start: float = 0.0  # s after its start
+    end: float = np.inf  # s
+
+    def holds(self, recording: str, time: float) -> bool:
+        """Whether ``time`` s after the start of a recording is in it."""
+        return recording == self.recording and self.start <= time < self.end
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One free number beside the inertial ones."""
 
@@ -61,11 +74,17 @@ class Parameter:
     unknown: bool = False  # of a mount that the description leaves out
     #: Entries that it moves, and by how much each, beside what others say of them; ``index`` is none then
     shifts: tuple[tuple[int, float], ...] = ()
+    #: Stretches in which it counts, of any recording; none: it always does
+    during: tuple[Stretch, ...] = ()
 
     @property
     def written(self) -> tuple[int, ...]:
         """Entries that hold the number itself."""
         return () if self.shifts else (self.index, *self.also)
+
+    def counts(self, recording: str, time: float) -> bool:
+        """Whether it counts ``time`` s after the start of a recording."""
+        return not self.during or any(s.holds(recording, time) for s in self.during)
 
     @property
     def described(self) -> bool:
@@ -216,10 +235,6 @@ class DeviceLayout:
         return self.lag("exciter") + 1 + 2 * MOUNTED.index(quantity)
 
 
-#: What shifts the exciter's force in time, alike to first order (prediction.drive).
-EXCITER_TIMES = ("exciter.clock", "exciter.lag")
-
-
 @dataclass
 class _Collector:
     parameters: list[Parameter] = field(default_factory=list)
@@ -328,6 +343,29 @@ class ParameterSet:
     model: RigModel  # described rig; its inertial block is only a placeholder
     places: DeviceLayout
     free: tuple[Parameter, ...]
+    silent: frozenset[int] = frozenset()  # of ``free``, those that do not count (:meth:`at`)
+
+    def at(self, recording: str, time: float) -> ParameterSet:
+        """The same vector as it is read ``time`` s after the start of a recording.
+
+        What does not count there is written nowhere, and moves nothing.
+        """
+        if not any(p.during for p in self.free):
+            return self
+        silent = frozenset(i for i, p in enumerate(self.free) if not p.counts(recording, time))
+        if silent not in self._silenced:
+            self._silenced[silent] = replace(self, silent=silent)
+        return self._silenced[silent]
+
+    @cached_property
+    def _silenced(self) -> dict[frozenset[int], ParameterSet]:
+        """Sets that :meth:`at` has made."""
+        return {}
+
+    @cached_property
+    def _heard(self) -> tuple[tuple[int, Parameter], ...]:
+        """Index in ``free`` and parameter of all that count."""
+        return tuple((i, p) for i, p in enumerate(self.free) if i not in self.silent)
 
     @property
     def size(self) -> int:
@@ -379,7 +417,7 @@ class ParameterSet:
         """By kind of array: which free parameter is written where."""
         out = {}
         for kind in ("physics", "device"):
-            written = [(i, entry) for i, p in enumerate(self.free) if p.kind == kind for entry in p.written]
+            written = [(i, entry) for i, p in self._heard if p.kind == kind for entry in p.written]
             pairs = np.array(written, dtype=np.int64).reshape(-1, 2)
             out[kind] = pairs[:, 0], pairs[:, 1]
         return out
@@ -389,7 +427,7 @@ class ParameterSet:
         """By kind of array: which free parameter moves which entry, and by how much."""
         out = {}
         for kind in ("physics", "device"):
-            moved = [(i, *s) for i, p in enumerate(self.free) if p.kind == kind for s in p.shifts]
+            moved = [(i, *s) for i, p in self._heard if p.kind == kind for s in p.shifts]
             table = np.array(moved, dtype=np.float64).reshape(-1, 3)
             out[kind] = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2]
         return out
@@ -432,8 +470,19 @@ class ParameterSet:
         moved |= {*self._entries["physics"][1].tolist(), *self._shifts["physics"][1].tolist()}
         if any(layout.GRAVITY <= p < layout.INERTIAL for p in moved):
             moved.add(layout.GRAVITY + 2)
-        clock = [EXCITER_CLOCK] if any(p.name in EXCITER_TIMES for p in self.free) else []
+        clock = [EXCITER_CLOCK] if any(self._exciter_time(p) for _, p in self._heard) else []
         return np.array(sorted(moved) + clock, dtype=np.int64)
+
+    def _exciter_time(self, parameter: Parameter) -> float:
+        """By how much a unit of a parameter shifts the exciter's force in time (prediction.drive), s.
+
+        To first order its clock and its low-pass shift alike.
+        """
+        if parameter.kind != "device":
+            return 0.0
+        times = (self.places.exciter_clock, self.places.lag("exciter"))
+        written = [1.0 for entry in parameter.written if entry in times]
+        return sum([*written, *(weight for entry, weight in parameter.shifts if entry in times)])
 
     def physics_jacobian(self, theta: Array) -> Array:
         """(len(directions), size): derivative of the chosen physics entries in the vector."""
@@ -444,17 +493,20 @@ class ParameterSet:
         for i in range(INERTIAL):
             out[row_of[layout.INERTIAL + i], :INERTIAL] = inertial[i]
         physics = self.physics(theta)
-        for column, p in enumerate(self.free, start=INERTIAL):
+        for i, p in self._heard:
+            column = INERTIAL + i
             if p.kind == "physics":
                 for entry in p.written:
                     out[row_of[entry], column] = p.slope(theta[column])
                 for entry, weight in p.shifts:
                     out[row_of[entry], column] += weight * p.slope(theta[column])
-                if layout.GRAVITY <= p.index < layout.GRAVITY + 2:
-                    slope = -physics[p.index] / physics[layout.GRAVITY + 2]
-                    out[row_of[layout.GRAVITY + 2], column] = p.prior_std * slope
-            elif p.name in EXCITER_TIMES:
-                out[row_of[EXCITER_CLOCK], column] = p.prior_std
+                for entry in (*p.written, *(e for e, _ in p.shifts)):
+                    if layout.GRAVITY <= entry < layout.GRAVITY + 2:
+                        # A tilt takes from the vertical what it gives to the side
+                        slope = -physics[entry] / physics[layout.GRAVITY + 2]
+                        out[row_of[layout.GRAVITY + 2], column] += out[row_of[entry], column] * slope
+            elif shift := self._exciter_time(p):
+                out[row_of[EXCITER_CLOCK], column] = shift * p.prior_std
         return out
 
     def device_columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:

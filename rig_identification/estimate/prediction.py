@@ -49,6 +49,15 @@ class Bench:
     mocap: sensors.MocapMount | None = None
     unseen: bool = False  # nothing that was measured tells how far the body swings (unseen_swing.py)
 
+    def of(self, run: Run) -> Bench:
+        """The bench as it is during a run: a number may count in some stretches alone (Parameter.during)."""
+        return self.at(run.recording.name, run.offset + 0.5 * run.grid.duration)
+
+    def at(self, recording: str, time: float) -> Bench:
+        """The bench as it is ``time`` s after the start of a recording."""
+        parameters = self.parameters.at(recording, time)
+        return self if parameters is self.parameters else replace(self, parameters=parameters)
+
 
 def model_at(parameters: ParameterSet, theta: Array) -> RigModel:
     """The rig with the numbers of ``theta``."""
@@ -288,6 +297,7 @@ def linearise_run(
     is then linearised about what really happened instead of about an undisturbed one. discrepancy: a wrench
     that the model lacks; the latent is then of this one.
     """
+    bench = bench.of(run)
     parameters = bench.parameters
     model = model_at(parameters, theta)
     basis = start_basis(model, start)

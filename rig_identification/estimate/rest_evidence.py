@@ -151,6 +151,7 @@ def linearise_rest(
     discrepancy: a wrench that the model lacks, of which the body feels one draw at rest.
     """
     work.add(TAKEN)
+    bench = bench.at(evidence.recording.name, 0.0)
     parameters = bench.parameters
     model = with_dummy(parameters.model.with_physics(parameters.physics(theta)), evidence.dummy)
     rest = find_rest(model, guess, directions=parameters.directions())

@@ -157,7 +157,8 @@ def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) ->
     for evidence, guess in zip(problem.rests, point.rest_guesses, strict=True):
         rest = linearise_rest(bench, evidence, point.theta, guess, problem.discrepancy)
         if rest is None:
-            model = with_dummy(model_at(bench.parameters, point.theta), evidence.dummy)
+            parameters = bench.at(evidence.recording.name, 0.0).parameters
+            model = with_dummy(model_at(parameters, point.theta), evidence.dummy)
             settled = settle(model, guess, FALLS)
             rest = linearise_rest(bench, evidence, point.theta, settled, problem.discrepancy)
         if rest is None:
@@ -179,7 +180,7 @@ def _assemble(
     information[:p, :p] = prior
     gradient[:p] = prior_gradient
     place = p
-    for run, start in zip(runs, point.starts, strict=True):
+    for run, start, of in zip(runs, point.starts, problem.runs, strict=True):
         starts = run.jacobian.shape[1] - p
         columns = np.concatenate([np.arange(p), np.arange(place, place + starts)])
         if inner:
@@ -194,7 +195,7 @@ def _assemble(
         gradient[columns] += run.jacobian.T @ run.residual
         cost += run.cost
         if problem.bench.unseen:
-            basis = start_basis(model_at(problem.bench.parameters, point.theta), start)
+            basis = start_basis(model_at(problem.bench.of(of).parameters, point.theta), start)
             belief = swing_belief(problem.bench.rig, start, basis)
             cost += belief[0]
             information[np.ix_(columns[p:], columns[p:])] += belief[1]
@@ -211,10 +212,10 @@ def moved_by(problem: Problem, evaluation: Evaluation, change: Array) -> Point:
     """Where a step of every unknown leads."""
     p = problem.bench.parameters.size
     theta = problem.bench.parameters.moved(evaluation.point.theta, change[:p])
-    old = model_at(problem.bench.parameters, evaluation.point.theta)
-    new = model_at(problem.bench.parameters, theta)
     starts, place = [], p
-    for state in evaluation.point.starts:
+    for run, state in zip(problem.runs, evaluation.point.starts, strict=True):
+        parameters = problem.bench.of(run).parameters
+        old, new = model_at(parameters, evaluation.point.theta), model_at(parameters, theta)
         basis = start_basis(old, state)
         own = change[place : place + basis.shape[1]]
         starts.append(on_cables(new, state.moved(basis @ own)))

@@ -88,6 +88,7 @@ def fit_start(
     polish: see :func:`solve`. doubted: std, in tolerances, of what is believed of rig and devices
     (:class:`Doubts`).
     """
+    bench = bench.of(run)
     p = bench.parameters.size
     model = model_at(bench.parameters, theta)
 

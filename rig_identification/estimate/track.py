@@ -114,6 +114,7 @@ def track(
     start_spread (12, 12): covariance of the start. noise (6, 6): covariance of the random
     wrench over one node interval (:func:`wrench_noise`). doubted: see :func:`doubted_variance`.
     """
+    bench = bench.of(run)
     more = doubted_variance(bench, run, theta, start, doubted)
     model = model_at(bench.parameters, theta)
     nodes = run.grid.nodes

@@ -71,11 +71,11 @@ def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Eval
 
 def _smoothed(problem: Problem, evaluation: Evaluation) -> Evaluation | None:
     """About the motion to which the smoother brings that of ``evaluation``, whatever it gains."""
-    model = model_at(problem.bench.parameters, evaluation.point.theta)
     starts, latents = [], []
-    for run, start, latent in zip(
-        evaluation.runs, evaluation.point.starts, evaluation.point.latents, strict=True
+    for of, run, start, latent in zip(
+        problem.runs, evaluation.runs, evaluation.point.starts, evaluation.point.latents, strict=True
     ):
+        model = model_at(problem.bench.of(of).parameters, evaluation.point.theta)
         states, wrenches = smoothed_from(run, START, SPEED)
         starts.append(on_cables(model, start.moved(states[0])))
         latents.append(wrenches if latent is None else latent + wrenches)

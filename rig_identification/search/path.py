@@ -38,8 +38,8 @@ def followed(problem: Problem, point: Point) -> Point | None:
 
 
 def _smoothed(problem: Problem, there: Evaluation) -> Point:
-    model = model_at(problem.bench.parameters, there.point.theta)
-    pairs = [_of_run(model, s, r) for s, r in zip(there.point.starts, there.runs, strict=True)]
+    models = (model_at(problem.bench.of(run).parameters, there.point.theta) for run in problem.runs)
+    pairs = [_of_run(*own) for own in zip(models, there.point.starts, there.runs, strict=True)]
     return replace(there.point, starts=tuple(s for s, _ in pairs), latents=tuple(w for _, w in pairs))
 
 
@@ -70,11 +70,12 @@ def beside(problem: Problem, point: Point, wide: Problem, there: Evaluation) -> 
     problem: of ``there``. An effect that enters with all of its amount acts beside wrenches that stood in for
     it; without this the motion is lost within seconds.
     """
-    old = model_at(problem.bench.parameters, there.point.theta)
-    new = model_at(wide.bench.parameters, point.theta)
     latents = []
     for run, linearised in zip(problem.runs, there.runs, strict=True):
-        driven = drive(run, problem.bench.parameters, there.point.theta)
+        parameters = problem.bench.of(run).parameters
+        old = model_at(parameters, there.point.theta)
+        new = model_at(wide.bench.of(run).parameters, point.theta)
+        driven = drive(run, parameters, there.point.theta)
         driven = replace(driven, wrench=driven.wrench + linearised.latent)
         latents.append(kept_in_motion(old, linearised.motion, driven, new))
     return replace(point, latents=tuple(latents))

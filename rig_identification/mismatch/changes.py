@@ -1,0 +1,409 @@
+"""A number of the rig, of a device or of the body that changes at an instant, and is another one from then on.
+
+A clamp slips, an IMU is bumped, a zero jumps, a mass is taken off the body between two recordings. Any number
+that is wrong all the time may be wrong from an instant on, or in one recording alone. Of a number's column j of
+the whitened Jacobian such a change has the rows after that instant. What a change of the rig does to the motion
+it does from a start of its own, which takes twelve more columns: those of the run's start, after that instant.
+With everything that is free anyway eliminated (beyond.py), a group of k such columns has information F and
+gradient g, in units of its prior, and adds to the log evidence (Laplace, MacKay, ch. 28)
+    1/2 g^T (F + 1)^-1 g - 1/2 log det(F + 1).
+From that the logarithm of the number of hypotheses is taken. A change between two recordings is as likely
+beforehand as one within any of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from rig_identification.estimate.estimates import Estimates
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter, ParameterSet, Stretch
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.mismatch.locate import devices_of
+from rig_identification.mismatch.mount_errors import mount_errors
+from rig_identification.mismatch.rig_errors import rig_errors
+from rig_identification.mismatch.screen import adding, carried, free_without
+from rig_identification.mismatch.sensor_errors import sensor_errors
+from rig_identification.mismatch.shared_errors import shared_errors
+from rig_identification.model import layout
+from rig_identification.model.body import linear_in_log_cholesky
+from rig_identification.model.definite import definite
+from rig_identification.rig import Rig
+
+Array = NDArray[np.float64]
+
+#: Seconds between the instants of a run that are asked, and about the best of them; and what is left of a run
+#: on either side at least.
+APART, FINELY, LEFT = 0.5, 0.05, 1.0
+#: Share of the body's mass that is put on it or taken off: std of the prior.
+LOAD = 0.03
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers that change together, as columns of a problem's vector."""
+
+    numbers: tuple[Parameter, ...]  # of the change
+    columns: Array  # (size, k) in units of their priors
+    of: Candidate | None  # the same, wrong all the time; None: the body
+
+
+@dataclass(frozen=True)
+class Change:
+    """Numbers that are other ones in some stretches of a session's recordings."""
+
+    group: Group
+    stretches: tuple[Stretch, ...]  # in which they are
+    net: float  # nats that it adds to the log evidence, to first order
+    durations: Mapping[str, float]  # s, of every recording
+
+    @cached_property
+    def candidate(self) -> Candidate:
+        """The hypothesis."""
+        return _changed(self.group, self.stretches, self.durations)
+
+    def lasting(self, recordings: Mapping[str, float]) -> Change:
+        """The same through further ``recordings``, which last so many s."""
+        durations = {**self.durations, **recordings}
+        return replace(self, stretches=(*self.stretches, *map(Stretch, recordings)), durations=durations)
+
+    @property
+    def within(self) -> Stretch | None:
+        """The stretch that begins within its recording; None where it happened between two of them."""
+        return next((s for s in self.stretches if s.start > 0.0), None)
+
+
+def changeable(rig: Rig, parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
+    """What may be wrong from an instant on: everything of the rig and its devices that is a number."""
+    return [
+        *sensor_errors(rig, parameters, devices),
+        *rig_errors(rig, parameters),
+        *mount_errors(rig, parameters),
+        *shared_errors(rig, parameters),
+    ]
+
+
+def likeliest_change(problem: Problem, evaluation: Evaluation, mass: float) -> Change | None:
+    """The change that adds most to the log evidence about ``evaluation``; None where none adds to it.
+
+    mass: kg, of the body.
+    """
+    candidates = changeable(problem.bench.rig, problem.bench.parameters, devices_of(problem))
+    wide = adding(problem, candidates)
+    point = carried(wide, problem, evaluation.point)
+    full = evaluate(wide, point)
+    if full is None:
+        return None
+    added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
+    base = free_without(wide, point, full, added, 0)
+    groups = [*_numbers(wide.bench.parameters, candidates), _body(wide, full, mass)]
+    asked = _Asked(wide, full, base, groups)
+    best = max(asked.all(), key=lambda told: told.net, default=None)
+    if best is None or best.net <= 0.0:
+        return None
+    finer = [best] if best.within is None else [best, *asked.near(best)]
+    best = max(finer, key=lambda told: told.net)
+    durations = {r.recording.name: r.recording.duration for r in (*problem.rests, *problem.runs)}
+    return Change(groups[best.group], best.stretches, best.net, durations)
+
+
+def _numbers(parameters: ParameterSet, candidates: Sequence[Candidate]) -> Iterator[Group]:
+    free = {p.name: p for p in parameters.free}
+    for c in candidates:
+        columns = np.zeros((parameters.size, len(c.parameters)))
+        for k, p in enumerate(c.parameters):
+            # A doubt's column is in units of its tolerance
+            columns[parameters.index_of(p.name), k] = p.prior_std / free[p.name].prior_std
+        yield Group(c.parameters, columns, c)
+
+
+def _body(problem: Problem, full: Evaluation, mass: float) -> Group:
+    """A load on the body, or off it: its ten numbers, which add."""
+    size = float(np.max(extent(problem.bench.rig)))
+    std = LOAD * mass * np.array([1.0, *(size,) * 3, *(size**2,) * 6])
+    columns = np.zeros((problem.bench.parameters.size, INERTIAL))
+    columns[:INERTIAL] = np.linalg.inv(linear_in_log_cholesky(full.point.theta[:INERTIAL])) * std
+    units = ["kg", *("kg*m",) * 3, *("kg*m^2",) * 6]
+    numbers = tuple(
+        Parameter(f"load.{name}", unit, 0.0, float(s), "physics", layout.INERTIAL + i, bounded=False)
+        for i, (name, unit, s) in enumerate(zip(LINEAR, units, std, strict=True))
+    )
+    return Group(numbers, columns, None)
+
+
+#: The ten numbers of a load about the datum, which add (model/body.py).
+LINEAR = ("mass", "mx", "my", "mz", "xx", "xy", "xz", "yy", "yz", "zz")
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What one group is worth in some stretches."""
+
+    group: int
+    stretches: tuple[Stretch, ...]
+    net: float
+
+    @property
+    def within(self) -> Stretch | None:
+        """The stretch that begins within its recording."""
+        return next((s for s in self.stretches if s.start > 0.0), None)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Sums over some rows of a run or a rest pose: they tell all that a restricted column needs."""
+
+    cross: Array  # (unknowns, q) of all unknowns' columns with the asked ones
+    right: Array  # (q,) gradient
+
+    def __add__(self, other: _Part) -> _Part:
+        return _Part(self.cross + other.cross, self.right + other.right)
+
+
+class _Asked:
+    """All changes of a linearised problem."""
+
+    def __init__(
+        self, problem: Problem, full: Evaluation, base: NDArray[np.int64], groups: list[Group]
+    ) -> None:
+        self._problem, self._full, self._base, self._groups = problem, full, base, groups
+        self._size = problem.bench.parameters.size
+        self._maps = np.concatenate([g.columns for g in groups], axis=1)
+        ends = np.cumsum([len(g.numbers) for g in groups])
+        self._of = [np.arange(end - len(g.numbers), end) for end, g in zip(ends, groups, strict=True)]
+        self._scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[base], 1e-300))
+        inside = full.information[np.ix_(base, base)] * np.outer(self._scale, self._scale)
+        self._factor = cho_factor(definite(inside + 1e-12 * np.eye(base.size)))
+        starts = [run.jacobian.shape[1] - self._size for run in full.runs]
+        self._places = self._size + np.concatenate([[0], np.cumsum(starts)]).astype(int)
+        self._whole = {name: self._of_recording(name) for name in self._recordings()}
+        instants = sum(self._instants(i).size for i in range(len(full.runs)))
+        between = max(1, len(self._between()))
+        count = 2.0 * len(groups)
+        self._charge_between, self._charge_within = np.log(count * between), np.log(count * max(1, instants))
+
+    def all(self) -> Iterator[_Told]:
+        """Every group in every set of recordings, and from every instant on."""
+        for names in self._between():
+            part = sum((self._whole[n] for n in names[1:]), self._whole[names[0]])
+            yield from self._told(part, tuple(map(Stretch, names)), None, self._charge_between)
+        for index in range(len(self._full.runs)):
+            yield from self._from_instants(index, self._instants(index))
+
+    def near(self, best: _Told) -> Iterator[_Told]:
+        """The same group from instants about the best one's on."""
+        there = best.within
+        if there is None:
+            return
+        for index, run in enumerate(self._problem.runs):
+            if not _holds(run, there):
+                continue
+            at = there.start - run.offset + np.arange(-APART, APART, FINELY)
+            at = at[(at > LEFT) & (at < run.grid.duration - LEFT)]
+            yield from (t for t in self._from_instants(index, at) if t.group == best.group)
+
+    def _recordings(self) -> list[str]:
+        """Names of all recordings, the oldest first where their stamps tell."""
+        found = {r.recording.name: r.recording.start_ns for r in (*self._problem.rests, *self._problem.runs)}
+        return sorted(found, key=lambda name: found[name])
+
+    def _between(self) -> list[tuple[str, ...]]:
+        """Sets of recordings in which a number may be another one than in the others."""
+        names = self._recordings()
+        later = [tuple(names[k:]) for k in range(1, len(names))]
+        alone = [(name,) for name in names[: -1 if len(names) > 1 else 0]]
+        # Of two recordings one against the other says all
+        return later if len(names) == 2 else [*later, *alone]
+
+    def _instants(self, index: int) -> Array:
+        """(k,) s after a run's first node, at which it may be cut."""
+        duration = self._problem.runs[index].grid.duration
+        return np.arange(LEFT, duration - LEFT, APART) if duration > 2.0 * LEFT else np.zeros(0)
+
+    def _of_recording(self, name: str) -> _Part:
+        """Sums over all of a recording."""
+        total = _Part(np.zeros((int(self._places[-1]), self._maps.shape[1])), np.zeros(self._maps.shape[1]))
+        for index, run in enumerate(self._problem.runs):
+            if run.recording.name == name:
+                total += self._rows(index, slice(None), self._maps)
+        for evidence, rest in zip(self._problem.rests, self._full.rests, strict=True):
+            if evidence.recording.name == name:
+                columns = rest.jacobian @ self._maps
+                cross = np.zeros_like(total.cross)
+                cross[: self._size] = rest.jacobian.T @ columns
+                total += _Part(cross, columns.T @ rest.residual)
+        return total
+
+    def _rows(self, index: int, rows: slice, maps: Array) -> _Part:
+        """Sums over some rows of a run. maps (size + starts or size, q): what is asked."""
+        run = self._full.runs[index]
+        jacobian = run.jacobian[rows]
+        columns = jacobian[:, : maps.shape[0]] @ maps
+        own = jacobian.T @ columns
+        cross = np.zeros((int(self._places[-1]), maps.shape[1]))
+        cross[: self._size] = own[: self._size]
+        cross[self._places[index] : self._places[index + 1]] = own[self._size :]
+        return _Part(cross, columns.T @ run.residual[rows])
+
+    def _from_instants(self, index: int, instants: Array) -> Iterator[_Told]:
+        """Every group from each of some instants (s after its first node) of a run on."""
+        run, lin = self._problem.runs[index], self._full.runs[index]
+        starts = lin.jacobian.shape[1] - self._size
+        maps = np.zeros((self._size + starts, self._maps.shape[1] + starts))
+        maps[: self._size, : self._maps.shape[1]] = self._maps
+        maps[self._size :, self._maps.shape[1] :] = np.eye(starts)
+        names = self._recordings()
+        later = names[names.index(run.recording.name) + 1 :]
+        rest = self._later(later, starts)
+        # What follows within the same recording, where a run was cut already, changes too
+        for other, of in enumerate(self._problem.runs):
+            if of.recording is run.recording and of.offset > run.offset:
+                rest += self._wider(self._rows(other, slice(None), self._maps), starts)
+        part, end = None, lin.nodes.size
+        for at in instants[::-1]:
+            first = int(np.searchsorted(lin.nodes, at / run.grid.step))
+            here = self._rows(index, slice(first, end), maps)
+            part, end = here if part is None else part + here, first
+            there = Stretch(run.recording.name, run.offset + float(at))
+            yield from self._told(part, (there,), starts, self._charge_within)
+            if later:
+                stretches = (there, *map(Stretch, later))
+                yield from self._told(part + rest, stretches, starts, self._charge_within)
+
+    def _later(self, names: Sequence[str], starts: int) -> _Part:
+        size = self._maps.shape[1]
+        none = _Part(np.zeros((int(self._places[-1]), size)), np.zeros(size))
+        return self._wider(sum((self._whole[n] for n in names), none), starts)
+
+    def _wider(self, part: _Part, starts: int) -> _Part:
+        """Sums beside which a run's start is asked for, which shows in none of these rows."""
+        cross = np.concatenate([part.cross, np.zeros((part.cross.shape[0], starts))], axis=1)
+        return _Part(cross, np.concatenate([part.right, np.zeros(starts)]))
+
+    def _told(
+        self, part: _Part, stretches: tuple[Stretch, ...], starts: int | None, charge: float
+    ) -> Iterator[_Told]:
+        """Every group whose rows ``part`` sums. starts: columns of a start of its own, after the groups'."""
+        size = self._maps.shape[1]
+        seen = self._scale[:, None] * part.cross[self._base]
+        solved = cho_solve(self._factor, seen)
+        gradient = part.right - solved.T @ (self._scale * self._full.gradient[self._base])
+        information = self._inner(part, stretches, starts) - seen.T @ solved
+        if starts:
+            own = definite(information[size:, size:] + 1e-9 * np.diag(np.diag(information)[size:]))
+            across = np.linalg.solve(own, information[size:, :size])
+            gradient = gradient[:size] - across.T @ gradient[size:]
+            information = information[:size, :size] - information[:size, size:] @ across
+        for group, own in enumerate(self._of):
+            inside = information[np.ix_(own, own)] + np.eye(own.size)
+            values, vectors = np.linalg.eigh(0.5 * (inside + inside.T))
+            values = np.maximum(values, 1.0)
+            pull = vectors.T @ gradient[own]
+            net = 0.5 * float(np.sum(pull**2 / values) - np.sum(np.log(values))) - float(charge)
+            yield _Told(group, stretches, net)
+
+    def _inner(self, part: _Part, stretches: tuple[Stretch, ...], starts: int | None) -> Array:
+        """(q, q) information of the restricted columns with one another: both are the same rows'."""
+        own = self._maps.T @ part.cross[: self._size]
+        if not starts:
+            return own
+        # The start's columns show in one run's rows alone, where ``part`` has them as unknowns as well
+        there = stretches[0]
+        index = next(i for i, run in enumerate(self._problem.runs) if _holds(run, there))
+        first, last = self._places[index], self._places[index + 1]
+        return np.concatenate([own, part.cross[first:last]], axis=0)
+
+
+def _holds(run: Run, stretch: Stretch) -> bool:
+    """Whether a stretch begins within a run."""
+    begins = stretch.start - run.offset
+    return run.recording.name == stretch.recording and 0.0 < begins < run.grid.duration
+
+
+def _changed(group: Group, stretches: tuple[Stretch, ...], durations: Mapping[str, float]) -> Candidate:
+    """The hypothesis that a group's numbers are other ones in some stretches."""
+    mark = _mark(stretches)
+    own = tuple(
+        replace(
+            p,
+            name=f"{p.name}@{mark}",
+            nominal=0.0,
+            index=-1,
+            also=(),
+            bounded=False,
+            freed=False,
+            shifts=p.shifts or tuple((entry, 1.0) for entry in p.written),
+            during=stretches,
+        )
+        for p in group.numbers
+    )
+    times: list[dict[str, object]] = [
+        {"recording": s.recording, "start": round(s.start, 2), "end": round(durations[s.recording], 2)}
+        for s in stretches
+    ]
+    since = _since(stretches)
+    if group.of is None:
+        return _load(own, since, times)
+    base = group.of
+
+    def told(found: Estimates) -> Told:
+        index = [list(found.values).index(p.name) for p in own]
+        values = {p.name: p.nominal + found.values[q.name] for p, q in zip(base.parameters, own, strict=True)}
+        return base.told(Estimates(values, found.covariance[np.ix_(index, index)]))
+
+    return Candidate(
+        base.effect,
+        own,
+        f"{since}: {base.sentence}",
+        f"Find out what was touched or came loose then. {base.advice}",
+        {**base.where, "times": times},
+        tell=told,
+    )
+
+
+def _mark(stretches: tuple[Stretch, ...]) -> str:
+    """What tells a changed number's name from that of the number."""
+    first = stretches[0]
+    since = f"{first.recording}+{first.start:.2f}" if first.start > 0.0 else first.recording
+    return f"{since}({len(stretches)})"
+
+
+def _since(stretches: tuple[Stretch, ...]) -> str:
+    """When a number is another one, as the beginning of a sentence."""
+    first = stretches[0]
+    if first.start > 0.0:
+        later = "" if len(stretches) == 1 else " and in what was recorded later"
+        return f"From {first.start:.1f} s of {first.recording} on{later}"
+    return f"In {', '.join(s.recording for s in stretches)}, unlike before"
+
+
+def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]) -> Candidate:
+    """Something is put on the body, or taken off it."""
+    names = [p.name for p in own]
+
+    def place(axis: int, *numbers: float) -> float:
+        return numbers[1 + axis] / numbers[0]
+
+    def told(found: Estimates) -> Told:
+        out: Told = {"mass": (*found.of(names[0]), "kg")}
+        if abs(found.values[names[0]]) > 3.0 * found.std(names[0]):
+            for i, a in enumerate(AXES):
+                out[f"position_{a}"] = (*found.following(lambda *v, i=i: place(i, *v), *names[:4]), "m")
+        return out
+
+    return Candidate(
+        "unknown",
+        own,
+        f"{since}: the body is heavier by {{value}} than before, or its load has moved.",
+        "Fasten what lies on it, and record everything with the same load.",
+        {"channel": None, "axis": None, "law": "changed load", "times": times},
+        tell=told,
+    )

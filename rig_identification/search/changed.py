@@ -1,0 +1,177 @@
+"""Something that changed at an instant: found as a number that is another one from then on, and fitted as such.
+
+It comes before the search where it adds more to the log evidence than anything that is wrong all the time, and
+after it beside the likeliest effects. As with an event, what it leaves of the session is searched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rig_identification.estimate.estimates import estimates
+from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import Ideal, Start, fit_from, judged
+from rig_identification.estimate.launch import launch_states
+from rig_identification.estimate.observability import invert_information
+from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.changes import Change, likeliest_change
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
+from rig_identification.mismatch.findings import finding
+from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
+from rig_identification.mismatch.pulse import all_runs
+from rig_identification.mismatch.screen import carried, extended, screen
+from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
+from rig_identification.result import Finding, Mismatch
+from rig_identification.search.events import OUTSIDE, Event, all_without, wrong
+from rig_identification.search.ladder import Rung
+
+Notify = Callable[[str, float], None]
+#: Explains what a change leaves of a session; None where the ideal model explains it.
+Explain = Callable[[Ideal], Explained | None]
+
+#: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
+MEANT = 3.0
+#: Half of what is cut out about the instant of a change, s: so exactly is it known.
+ABOUT = 0.1
+
+
+def change_of(fitted: Fitted, first: Rung) -> Change | None:
+    """The change that adds more to the log evidence than anything that is wrong all the time, or None.
+
+    first: the model at its own level. Where it needs no wrench held-out runs are asked as well.
+    """
+    seen = _linearised(fitted, first)
+    if seen is None:
+        return None
+    problem, evaluation = seen
+    mass = mass_of(problem, evaluation)
+    change = likeliest_change(problem, evaluation, mass)
+    if change is None or change.net < MEANT:
+        return None
+    candidates = catalogue(problem)
+    count = count_of(candidates)
+    always = (net_gain(p, count) for p in screen(problem, evaluation, candidates, mass))
+    return change if change.net > max(always, default=0.0) + MEANT else None
+
+
+def _linearised(fitted: Fitted, first: Rung) -> tuple[Problem, Evaluation] | None:
+    if not first.alone:
+        return first.problem, first.evaluation
+    problem, point = all_runs(fitted)
+    evaluation = evaluate(problem, point)
+    return None if evaluation is None else (problem, evaluation)
+
+
+def explained_changed(ideal: Ideal, change: Change, explain: Explain, notify: Notify) -> Explained | None:
+    """What explains the session with a change in its model, and the change; None where something is left."""
+    notify(f"search: {change.candidate.label} that changes", 0.1)
+    fitted = ideal.fitted
+    candidate, own = _told_by_held_runs(fitted, change)
+    every = [candidate, *(c.candidate for c in _lasting(fitted, change))]
+    fits = [_fitted_with(fitted, change, c, notify) for c in every]
+    known = [(again, c) for again, c in zip(fits, every, strict=True) if again is not None]
+    if not known:
+        return None
+    again, candidate = min(known, key=lambda k: wrong(k[0]))
+    if wrong(again) > OUTSIDE * wrong(fitted):
+        return None
+    rest = Ideal(again, *judged(again))
+    found = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
+    if found.mismatch.verdict not in ("none", "explained") or found.trace:
+        return None
+    return _with_change(found, ideal, candidate, own=own)
+
+
+def _lasting(fitted: Fitted, change: Change) -> list[Change]:
+    """The change through held-out recordings that came later too, where only fitted ones were asked."""
+    held = {r.recording.name: r.recording for r in (*fitted.holdout_runs, *fitted.lost)}
+    if not change.durations.keys().isdisjoint(held):
+        return []
+    used = {r.recording.name: r.recording for r in (*fitted.problem.rests, *fitted.problem.runs)}
+    since = min(used[s.recording].start_ns for s in change.stretches)
+    later = {name: r.duration for name, r in held.items() if r.start_ns > since}
+    return [change.lasting(later)] if later else []
+
+
+def _fitted_with(fitted: Fitted, change: Change, candidate: Candidate, notify: Notify) -> Fitted | None:
+    """The session fitted anew with a change in its model; None where that cannot be."""
+    runs, held = _cut(fitted.problem.runs, change), _cut((*fitted.holdout_runs, *fitted.lost), change)
+    if not runs:
+        return None
+    problem = extended(replace(fitted.problem, runs=runs), (candidate,))
+    point = carried(problem, fitted.problem, fitted.guess or fitted.evaluation.point)
+    try:
+        starts = launch_states(problem.bench, runs, point.theta, fitted.rest)
+        start = Start(
+            problem,
+            replace(point, starts=starts, latents=()),
+            fitted.rest,
+            held,
+            fitted.notes,
+            fitted.held_parts,
+            fitted.unfollowed,
+            fitted.stretch,
+        )
+        return fit_from(start, notify)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _with_change(found: Explained, ideal: Ideal, candidate: Candidate, *, own: bool) -> Explained:
+    """The explanation of the rest, and the change before it. own: only held-out runs tell of it."""
+    fitted = found.fitted
+    after = judged(fitted)[0].holdout
+    gain = float(wrong(ideal.fitted) - wrong(fitted))
+    evidence = {**evidence_of(ideal, fitted, after), "log_likelihood_gain": gain}
+    trial = Trial(candidate, fitted.problem, fitted.evaluation, log_evidence(fitted.evaluation))
+    told: Finding = finding(trial, estimates(fitted.problem, fitted.evaluation), evidence)
+    beside = f"{found.mismatch.explanation} " if found.mismatch.findings else ""
+    text = (
+        "Something changed while the session was recorded; with that every residual is noise. "
+        f"{beside}{held_out_errors(ideal.scores.holdout, after)}"
+    )
+    if own:
+        text += " The held-out recording itself tells the change: nothing else of the model is fitted to it."
+    mismatch = Mismatch("explained", text, (told, *found.mismatch.findings), found.mismatch.alternatives)
+    return replace(found, mismatch=mismatch, ideal=ideal)
+
+
+def _cut(runs: tuple[Run, ...], change: Change) -> tuple[Run, ...]:
+    """Runs in parts before and after the instant of a change."""
+    there = change.within
+    if there is None:
+        return runs
+    return all_without(runs, Event(there.recording, there.start - ABOUT, there.start + ABOUT))
+
+
+def _told_by_held_runs(fitted: Fitted, change: Change) -> tuple[Candidate, bool]:
+    """The hypothesis of a change, its numbers known where held-out runs alone have them; and whether so.
+
+    What is another number in a held-out run alone is that run's own, as its start is. No fitted run says
+    anything of it, and it says nothing of what they are fitted with.
+    """
+    used = {r.recording.name for r in (*fitted.problem.runs, *fitted.problem.rests)}
+    if any(s.recording in used for s in change.stretches):
+        return change.candidate, False
+    plain, point = all_runs(fitted)
+    plain = replace(plain, runs=_cut(plain.runs, change))
+    if len(plain.runs) != len(point.starts):
+        # A held-out run that was cut: its parts begin elsewhere
+        states = launch_states(plain.bench, plain.runs, point.theta, fitted.rest)
+        point = replace(point, starts=states)
+    problem = extended(plain, (change.candidate,))
+    evaluation, _ = solve(problem, carried(problem, plain, point))
+    spread = invert_information(evaluation.information)
+    parameters, theta = problem.bench.parameters, evaluation.point.theta
+    known = []
+    for p in change.candidate.parameters:
+        i = parameters.index_of(p.name)
+        value = parameters.free[i - INERTIAL].value(theta[i])
+        known.append(replace(p, nominal=value, prior_std=p.prior_std * float(np.sqrt(spread[i, i]))))
+    return replace(change.candidate, parameters=tuple(known)), True
