@@ -25,18 +25,12 @@ from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter, ParameterSet, Stretch
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.candidate import Candidate, Told
-from rig_identification.mismatch.locate import devices_of
-from rig_identification.mismatch.mount_errors import mount_errors
-from rig_identification.mismatch.rig_errors import rig_errors
-from rig_identification.mismatch.screen import adding, carried, free_without
-from rig_identification.mismatch.sensor_errors import sensor_errors
-from rig_identification.mismatch.shared_errors import shared_errors
+from rig_identification.mismatch.screen import Promise, opened_with, promise_of
 from rig_identification.model import layout
 from rig_identification.model.body import linear_in_log_cholesky
 from rig_identification.model.definite import definite
-from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -81,43 +75,63 @@ class Change:
         return next((s for s in self.stretches if s.start > 0.0), None)
 
 
-def changeable(rig: Rig, parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
-    """What may be wrong from an instant on: everything of the rig and its devices that is a number."""
-    return [
-        *sensor_errors(rig, parameters, devices),
-        *rig_errors(rig, parameters),
-        *mount_errors(rig, parameters),
-        *shared_errors(rig, parameters),
-    ]
+def likeliest_change(
+    problem: Problem, evaluation: Evaluation, mass: float, candidates: list[Candidate]
+) -> tuple[Change | None, list[Promise]]:
+    """The change that adds most to the log evidence about ``evaluation``, None where none adds to it.
 
-
-def likeliest_change(problem: Problem, evaluation: Evaluation, mass: float) -> Change | None:
-    """The change that adds most to the log evidence about ``evaluation``; None where none adds to it.
-
-    mass: kg, of the body.
+    mass: kg, of the body. candidates: what may be wrong all the time; also returns what these promise.
     """
-    candidates = changeable(problem.bench.rig, problem.bench.parameters, devices_of(problem))
-    wide = adding(problem, candidates)
-    point = carried(wide, problem, evaluation.point)
-    full = evaluate(wide, point)
-    if full is None:
-        return None
-    added = {q.name for q in wide.bench.parameters.free} - {q.name for q in problem.bench.parameters.free}
-    base = free_without(wide, point, full, added, 0)
-    groups = [*_numbers(wide.bench.parameters, candidates), _body(wide, full, mass)]
-    asked = _Asked(wide, full, base, groups)
+    opened = opened_with(problem, evaluation, candidates)
+    if opened is None:
+        return None, []
+    wide, beyond, boxed = opened
+    always = [promise_of(wide, beyond, boxed, c) for c in candidates]
+    groups = [*_numbers(wide.bench.parameters, candidates), _body(wide, beyond.full, mass)]
+    asked = _Asked(wide, beyond.full, beyond.base, groups)
     best = max(asked.all(), key=lambda told: told.net, default=None)
     if best is None or best.net <= 0.0:
-        return None
+        return None, always
     finer = [best] if best.within is None else [best, *asked.near(best)]
     best = max(finer, key=lambda told: told.net)
     durations = {r.recording.name: r.recording.duration for r in (*problem.rests, *problem.runs)}
-    return Change(groups[best.group], best.stretches, best.net, durations)
+    return Change(groups[best.group], best.stretches, best.net, durations), always
+
+
+def changeable(candidate: Candidate) -> bool:
+    """Whether a hypothesis is an error of numbers that describe the rig or its devices.
+
+    What the contract has no word for is a law of a reading; an effect adds physics, which no one touches.
+    """
+    numbers = candidate.build is None and not candidate.everywhere and not candidate.curved
+    return numbers and candidate.effect in ERRORS
+
+
+#: Effects of the contract that are errors of a number.
+ERRORS = frozenset(
+    {
+        "imu_bias",
+        "imu_scale",
+        "imu_misalignment",
+        "imu_position",
+        "load_cell_gain",
+        "load_cell_offset",
+        "exciter_gain",
+        "exciter_position",
+        "exciter_misalignment",
+        "inclinometer_offset",
+        "clock_offset",
+        "sensor_lag",
+        "cable_length",
+        "hinge_position",
+        "level_error",
+    }
+)
 
 
 def _numbers(parameters: ParameterSet, candidates: Sequence[Candidate]) -> Iterator[Group]:
     free = {p.name: p for p in parameters.free}
-    for c in candidates:
+    for c in filter(changeable, candidates):
         columns = np.zeros((parameters.size, len(c.parameters)))
         for k, p in enumerate(c.parameters):
             # A doubt's column is in units of its tolerance
@@ -362,7 +376,7 @@ def _changed(group: Group, stretches: tuple[Stretch, ...], durations: Mapping[st
     return Candidate(
         base.effect,
         own,
-        f"{since}: {base.sentence}",
+        f"{since}: {_in_a_sentence(base.sentence)}",
         f"Find out what was touched or came loose then. {base.advice}",
         {**base.where, "times": times},
         tell=told,
@@ -383,6 +397,12 @@ def _since(stretches: tuple[Stretch, ...]) -> str:
         later = "" if len(stretches) == 1 else " and in what was recorded later"
         return f"From {first.start:.1f} s of {first.recording} on{later}"
     return f"In {', '.join(s.recording for s in stretches)}, unlike before"
+
+
+def _in_a_sentence(text: str) -> str:
+    """A sentence as it stands after a colon."""
+    first = text.split(" ", 1)[0]
+    return text[0].lower() + text[1:] if first in ("The", "All", "Every") else text
 
 
 def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]) -> Candidate:

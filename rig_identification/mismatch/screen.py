@@ -120,13 +120,13 @@ def screen(
     rig, model = problem.bench.rig, problem.bench.parameters.model
     axes = () if gives_way(model) else range(3)
     probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in axes]
-    opened = _opened(problem, evaluation, [*candidates, *probes])
+    opened = opened_with(problem, evaluation, [*candidates, *probes])
     if opened is None:
         return []
     wide, beyond, boxed = opened
     full = beyond.full
-    out = [_promise(wide, beyond, boxed, c) for c in candidates]
-    for probe in (_promise(wide, beyond, boxed, c) for c in probes):
+    out = [promise_of(wide, beyond, boxed, c) for c in candidates]
+    for probe in (promise_of(wide, beyond, boxed, c) for c in probes):
         out += _supports(problem, mass, probe)
     placed = [
         Promise(hose, gain, values) for hose, gain, values in placed_tethers(wide, full, beyond, candidates)
@@ -137,10 +137,13 @@ def screen(
     return sorted(out, key=lambda promise: -promise.gain)
 
 
-def _opened(
+def opened_with(
     problem: Problem, evaluation: Evaluation, candidates: list[Candidate]
 ) -> tuple[Problem, Beyond, Boxed] | None:
-    """The problem with what candidates add among its unknowns, and all that is free without it."""
+    """The problem with what candidates add among its unknowns, and all that is free without it.
+
+    None where the model cannot be evaluated with them.
+    """
     wide = adding(problem, candidates)
     point = carried(wide, problem, evaluation.point)
     full = evaluate(wide, point)
@@ -168,7 +171,8 @@ def free_without(
     return np.flatnonzero(~at_bound)
 
 
-def _promise(wide: Problem, beyond: Beyond, boxed: Boxed, candidate: Candidate) -> Promise:
+def promise_of(wide: Problem, beyond: Beyond, boxed: Boxed, candidate: Candidate) -> Promise:
+    """What one of the candidates promises that a problem was opened with."""
     free = {q.name: q for q in wide.bench.parameters.free}
     step = boxed.step(candidate.parameters, candidate.positive)
     values = {q.name: free[q.name].value(z) for q, z in zip(candidate.parameters, step.values, strict=True)}
@@ -322,7 +326,7 @@ def _all_ways(
     swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
 ) -> list[tuple[Candidate, dict[str, float]]]:
     """A part that was fitted along one axis or two, moving along others too. mass: kg, of the body."""
-    opened = _opened(problem, evaluation, [])
+    opened = opened_with(problem, evaluation, [])
     if opened is None:
         return []
     effect, known = swing.effect, swing.directions

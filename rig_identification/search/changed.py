@@ -25,7 +25,7 @@ from rig_identification.mismatch.explained import Explained, evidence_of, held_o
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
 from rig_identification.mismatch.pulse import all_runs
-from rig_identification.mismatch.screen import carried, extended, screen
+from rig_identification.mismatch.screen import Promise, carried, extended, screen
 from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
 from rig_identification.result import Finding, Mismatch
 from rig_identification.search.events import OUTSIDE, Event, all_without, wrong
@@ -44,20 +44,27 @@ ABOUT = 0.1
 def change_of(fitted: Fitted, first: Rung) -> Change | None:
     """The change that adds more to the log evidence than anything that is wrong all the time, or None.
 
-    first: the model at its own level. Where it needs no wrench held-out runs are asked as well.
+    first: the model at its own level. Where it needs no wrench held-out runs are asked as well. What swings
+    or pulls, at any frequency or place, takes longest to ask, and comes last; not at all where near the noise
+    the change has the larger part of what is wrong.
     """
     seen = _linearised(fitted, first)
     if seen is None:
         return None
     problem, evaluation = seen
     mass = mass_of(problem, evaluation)
-    change = likeliest_change(problem, evaluation, mass)
-    if change is None or change.net < MEANT:
-        return None
     candidates = catalogue(problem)
     count = count_of(candidates)
-    always = (net_gain(p, count) for p in screen(problem, evaluation, candidates, mass))
-    return change if change.net > max(always, default=0.0) + MEANT else None
+    change, always = likeliest_change(problem, evaluation, mass, candidates)
+
+    def likelier(promises: list[Promise]) -> bool:
+        return change is not None and change.net > max((net_gain(p, count) for p in promises), default=0.0)
+
+    if change is None or change.net < MEANT or not likelier(always):
+        return None
+    if first.alone and change.net > (1.0 - OUTSIDE) * wrong(fitted):
+        return change
+    return change if likelier(screen(problem, evaluation, candidates, mass)) else None
 
 
 def _linearised(fitted: Fitted, first: Rung) -> tuple[Problem, Evaluation] | None:
