@@ -16,7 +16,7 @@ from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.parameters import Parameter, Stretch
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
-from rig_identification.mismatch.changes import Change, likeliest_change
+from rig_identification.mismatch.changes import Change, likeliest_changes
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.trial import mass_of
@@ -81,7 +81,8 @@ def at_the_true_body(session: Session, truth: Truth) -> tuple[Problem, Evaluatio
 
 def change_in(session: Session, truth: Truth) -> Change | None:
     problem, evaluation = at_the_true_body(session, truth)
-    return likeliest_change(problem, evaluation, mass_of(problem, evaluation), catalogue(problem))[0]
+    mass = mass_of(problem, evaluation)
+    return next(iter(likeliest_changes(problem, evaluation, mass, catalogue(problem))[0]), None)
 
 
 @pytest.fixture(scope="module")

@@ -39,6 +39,9 @@ Array = NDArray[np.float64]
 APART, FINELY, LEFT = 0.5, 0.05, 1.0
 #: Share of the body's mass that is put on it or taken off: std of the prior.
 LOAD = 0.03
+#: Changes that are fitted at most, and the share of the best one's evidence that another one has to come to:
+#: first order is right within a factor of two.
+ALIKE, SHARE = 4, 0.5
 
 
 @dataclass(frozen=True)
@@ -75,27 +78,30 @@ class Change:
         return next((s for s in self.stretches if s.start > 0.0), None)
 
 
-def likeliest_change(
+def likeliest_changes(
     problem: Problem, evaluation: Evaluation, mass: float, candidates: list[Candidate]
-) -> tuple[Change | None, list[Promise]]:
-    """The change that adds most to the log evidence about ``evaluation``, None where none adds to it.
+) -> tuple[list[Change], list[Promise]]:
+    """Changes that add to the log evidence about ``evaluation``, each of other numbers, the likeliest first.
 
     mass: kg, of the body. candidates: what may be wrong all the time; also returns what these promise.
     """
     opened = opened_with(problem, evaluation, candidates)
     if opened is None:
-        return None, []
+        return [], []
     wide, beyond, boxed = opened
     always = [promise_of(wide, beyond, boxed, c) for c in candidates]
     groups = [*_numbers(wide.bench.parameters, candidates), _body(wide, beyond.full, mass)]
     asked = _Asked(wide, beyond.full, beyond.base, groups)
-    best = max(asked.all(), key=lambda told: told.net, default=None)
-    if best is None or best.net <= 0.0:
-        return None, always
-    finer = [best] if best.within is None else [best, *asked.near(best)]
-    best = max(finer, key=lambda told: told.net)
+    best: dict[int, _Told] = {}
+    for told in asked.all():
+        if told.net > max(0.0, best[told.group].net if told.group in best else 0.0):
+            best[told.group] = told
+    ranked = sorted(best.values(), key=lambda told: -told.net)
+    ranked = [t for t in ranked[:ALIKE] if t.net > SHARE * ranked[0].net]
+    finer = [max([t, *asked.near(t)], key=lambda told: told.net) for t in ranked]
     durations = {r.recording.name: r.recording.duration for r in (*problem.rests, *problem.runs)}
-    return Change(groups[best.group], best.stretches, best.net, durations), always
+    changes = [Change(groups[t.group], t.stretches, t.net, durations) for t in finer]
+    return sorted(changes, key=lambda change: -change.net), always
 
 
 def changeable(candidate: Candidate) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.changes import Change, likeliest_change
+from rig_identification.mismatch.changes import Change, likeliest_changes
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
@@ -41,8 +42,8 @@ MEANT = 3.0
 ABOUT = 0.1
 
 
-def change_of(fitted: Fitted, first: Rung) -> Change | None:
-    """The change that adds more to the log evidence than anything that is wrong all the time, or None.
+def changes_of(fitted: Fitted, first: Rung) -> list[Change]:
+    """Changes of which the likeliest adds more to the log evidence than anything that is wrong all the time.
 
     first: the model at its own level. Where it needs no wrench held-out runs are asked as well. What swings
     or pulls, at any frequency or place, takes longest to ask, and comes last; not at all where near the noise
@@ -50,21 +51,22 @@ def change_of(fitted: Fitted, first: Rung) -> Change | None:
     """
     seen = _linearised(fitted, first)
     if seen is None:
-        return None
+        return []
     problem, evaluation = seen
     mass = mass_of(problem, evaluation)
     candidates = catalogue(problem)
     count = count_of(candidates)
-    change, always = likeliest_change(problem, evaluation, mass, candidates)
+    changes, always = likeliest_changes(problem, evaluation, mass, candidates)
+    most = changes[0].net if changes else 0.0
 
     def likelier(promises: list[Promise]) -> bool:
-        return change is not None and change.net > max((net_gain(p, count) for p in promises), default=0.0)
+        return most > max((net_gain(p, count) for p in promises), default=0.0)
 
-    if change is None or change.net < MEANT or not likelier(always):
-        return None
-    if first.alone and change.net > (1.0 - OUTSIDE) * wrong(fitted):
-        return change
-    return change if likelier(screen(problem, evaluation, candidates, mass)) else None
+    if most < MEANT or not likelier(always):
+        return []
+    if first.alone and most > (1.0 - OUTSIDE) * wrong(fitted):
+        return changes
+    return changes if likelier(screen(problem, evaluation, candidates, mass)) else []
 
 
 def _linearised(fitted: Fitted, first: Rung) -> tuple[Problem, Evaluation] | None:
@@ -75,24 +77,48 @@ def _linearised(fitted: Fitted, first: Rung) -> tuple[Problem, Evaluation] | Non
     return None if evaluation is None else (problem, evaluation)
 
 
-def explained_changed(ideal: Ideal, change: Change, explain: Explain, notify: Notify) -> Explained | None:
-    """What explains the session with a change in its model, and the change; None where something is left."""
-    notify(f"search: {change.candidate.label} that changes", 0.1)
-    fitted = ideal.fitted
+def explained_changed(
+    ideal: Ideal, changes: list[Change], explain: Explain, notify: Notify
+) -> Explained | None:
+    """What explains the session with one of some changes in its model, and the change; None: nothing does.
+
+    A gain and a zero that jump are much the same beside a strong wrench. So each is fitted until one leaves
+    only noise, and the one that leaves least is told.
+    """
+    fitted, best = ideal.fitted, None
+    for change in changes:
+        found = _fitted_best(fitted, change, notify)
+        if found is None:
+            continue
+        if best is None or wrong(found.fitted) < wrong(best.fitted):
+            best = found
+        if judged(best.fitted)[1].verdict == "none":
+            break
+    if best is None or wrong(best.fitted) > OUTSIDE * wrong(fitted):
+        return None
+    rest = Ideal(best.fitted, *judged(best.fitted))
+    told = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
+    if told.mismatch.verdict not in ("none", "explained") or told.trace:
+        return None
+    return _with_change(told, ideal, best)
+
+
+class Changed(NamedTuple):
+    """A session fitted with a change in its model."""
+
+    fitted: Fitted
+    candidate: Candidate
+    own: bool  # whether held-out recordings alone tell of it
+
+
+def _fitted_best(fitted: Fitted, change: Change, notify: Notify) -> Changed | None:
+    """The session fitted anew with a change, lasting or not; None where that cannot be."""
     candidate, own = _told_by_held_runs(fitted, change)
     every = [candidate, *(c.candidate for c in _lasting(fitted, change))]
-    fits = [_fitted_with(fitted, change, c, notify) for c in every]
-    known = [(again, c) for again, c in zip(fits, every, strict=True) if again is not None]
-    if not known:
-        return None
-    again, candidate = min(known, key=lambda k: wrong(k[0]))
-    if wrong(again) > OUTSIDE * wrong(fitted):
-        return None
-    rest = Ideal(again, *judged(again))
-    found = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
-    if found.mismatch.verdict not in ("none", "explained") or found.trace:
-        return None
-    return _with_change(found, ideal, candidate, own=own)
+    notify(f"search: {candidate.label} that changes", 0.1)
+    fits = [(_fitted_with(fitted, change, c, notify), c) for c in every]
+    known = [Changed(again, c, own) for again, c in fits if again is not None]
+    return min(known, key=lambda k: wrong(k.fitted), default=None)
 
 
 def _lasting(fitted: Fitted, change: Change) -> list[Change]:
@@ -130,20 +156,20 @@ def _fitted_with(fitted: Fitted, change: Change, candidate: Candidate, notify: N
         return None
 
 
-def _with_change(found: Explained, ideal: Ideal, candidate: Candidate, *, own: bool) -> Explained:
-    """The explanation of the rest, and the change before it. own: only held-out runs tell of it."""
+def _with_change(found: Explained, ideal: Ideal, change: Changed) -> Explained:
+    """The explanation of the rest, and the change before it."""
     fitted = found.fitted
     after = judged(fitted)[0].holdout
     gain = float(wrong(ideal.fitted) - wrong(fitted))
     evidence = {**evidence_of(ideal, fitted, after), "log_likelihood_gain": gain}
-    trial = Trial(candidate, fitted.problem, fitted.evaluation, log_evidence(fitted.evaluation))
+    trial = Trial(change.candidate, fitted.problem, fitted.evaluation, log_evidence(fitted.evaluation))
     told: Finding = finding(trial, estimates(fitted.problem, fitted.evaluation), evidence)
     beside = f"{found.mismatch.explanation} " if found.mismatch.findings else ""
     text = (
         "Something changed while the session was recorded; with that every residual is noise. "
         f"{beside}{held_out_errors(ideal.scores.holdout, after)}"
     )
-    if own:
+    if change.own:
         text += " The held-out recording itself tells the change: nothing else of the model is fitted to it."
     mismatch = Mismatch("explained", text, (told, *found.mismatch.findings), found.mismatch.alternatives)
     return replace(found, mismatch=mismatch, ideal=ideal)
