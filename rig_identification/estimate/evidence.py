@@ -92,6 +92,7 @@ class Channel:
     node: Index  # (groups,)
     felt: float = 1.0  # std of the exciter's noise that a group feels at once, in that of an interval's mean
     wander: Array | None = None  # (w,) std of a tracker's error that goes with the pose (pose_error.py)
+    slow: Array | None = None  # (w,) factor on the noise at the motion's frequencies (noise_at_rest.py)
 
     @property
     def width(self) -> int:
@@ -138,7 +139,8 @@ class Channel:
     @cached_property
     def grouped_variance(self) -> Array:
         """(groups, w) variance of each group's mean."""
-        return np.asarray(self.noise**2 / np.bincount(self.group)[:, None])
+        noise = self.noise if self.slow is None else self.noise * self.slow
+        return np.asarray(noise**2 / np.bincount(self.group)[:, None])
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
+from rig_identification.estimate import noise_at_rest
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits, run_motion
 from rig_identification.estimate.enough import enough, told
@@ -35,6 +36,7 @@ from rig_identification.estimate.hung_by_eye import note_of as note_of_center
 from rig_identification.estimate.joint_information import joint_information
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
+from rig_identification.estimate.noise_at_rest import slow_noise, with_slow_noise
 from rig_identification.estimate.observability import inertial_estimate, unsettled
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
 from rig_identification.estimate.pose_error_told import LAW, pose_error_text, pose_errors
@@ -110,6 +112,8 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     rests = tuple(r for r in (prepare_rest(rig, recording) for recording in session.statics) if r.channels)
     if not (runs or rests):
         _refuse(session, held)
+    slow = slow_noise(rests)
+    runs, held = with_slow_noise(runs, slow), with_slow_noise(held, slow)
     model = with_rods(model, rig, rods_of(rig, (*runs, *held)))
     if not any(run.watched for run in runs):
         # How the tracker stands in the room is fitted, and to no held-out run
@@ -304,7 +308,9 @@ def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
     fitted = fit_from(_begun(problem, theta, held, progress), progress)
-    fitted = replace(fitted, notes=(*told((*problem.runs, *held)), *note_of_center(problem), *fitted.notes))
+    noisy = noise_at_rest.told(slow_noise(problem.rests))
+    notes = (*told((*problem.runs, *held)), *note_of_center(problem), *noisy)
+    fitted = replace(fitted, notes=(*notes, *fitted.notes))
     rods = rods_of(session.rig, (*problem.runs, *held))
     fitted = replace(fitted, notes=(*fitted.notes, note_of(rods))) if rods else fitted
     less = without_unseen_force(session, fitted, _surely_driven)

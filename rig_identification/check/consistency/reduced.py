@@ -23,10 +23,18 @@ Array = NDArray[np.float64]
 WINDOW = 12.0
 #: Kernel of the smoothing (s): between what the slowest channel resolves and the period of a rig's swing.
 NARROWEST, WIDEST = 0.02, 0.1
+#: Kernels in a period of the motion at least: a span of its spline is three of them, and four spans hold a
+#: period. A reading that is sampled more seldom than a kernel cannot be smoothed by it and takes no part.
+IN_A_PERIOD = 12.0
+#: Share of a reading's power below its highest frequency, and times the median ordinate that its largest one
+#: has at least where it is motion and no noise.
+POWER, STANDS_OUT = 0.9, 100.0
 #: Channels that take part; a shaft and a simulation's truth do not.
 CHANNELS = ("tension", "exciter_force", "imu", "inclination", "mocap")
 #: Instants come in such groups, one a span of the motion's spline; fewer than these are no motion.
 PER_SPAN, FEWEST = 3, 21
+#: ... by more than this factor: a median interval jitters.
+SLOWER = 1.2
 #: A gap of more kernels than this holds no information.
 GAP = 4.0
 #: A channel that covers less of the window than this share is left out of it.
@@ -119,9 +127,8 @@ def _median(rows: Array) -> Array:
 
 def _in_motion(raw: RawRecording, channels: list[RawChannel], start: float) -> Reduced | None:
     series = {c.device: _sorted(c) for c in channels}
-    intervals = [float(np.median(np.diff(t))) * 1e-9 for t, _ in series.values() if len(t) > 2]
-    kernel = float(np.clip(max(intervals, default=NARROWEST), NARROWEST, WIDEST))
     begin, end = _window(series, start)
+    kernel = _kernel(series, start, begin, end)
     time = np.arange(begin + 3.0 * kernel, end - 3.0 * kernel, kernel)
     time = time[: time.size // PER_SPAN * PER_SPAN]
     if time.size < FEWEST:
@@ -129,6 +136,8 @@ def _in_motion(raw: RawRecording, channels: list[RawChannel], start: float) -> R
     values = {}
     for channel in channels:
         stamps, rows = series[channel.device]
+        if _interval(stamps) > max(kernel, NARROWEST) * SLOWER:
+            continue
         if channel.channel == "mocap":
             rows = _continuous(rows)
         if channel.channel in ("imu", "inclination"):
@@ -139,6 +148,36 @@ def _in_motion(raw: RawRecording, channels: list[RawChannel], start: float) -> R
     return Reduced(
         raw.name, raw.kind, raw.holdout, raw.dummy, time - time[0], kernel, values, int(start + 1e9 * time[0])
     )
+
+
+def _interval(stamps: Array) -> float:
+    """Median sampling interval, s."""
+    return float(np.median(np.diff(stamps))) * 1e-9 if len(stamps) > 2 else 0.0
+
+
+def _kernel(series: Mapping[str, tuple[Array, Array]], start: float, begin: float, end: float) -> float:
+    """Width (s) of the smoothing: what the slowest channel resolves, if the motion in a window is as slow."""
+    slowest = max((_interval(t) for t, _ in series.values()), default=NARROWEST)
+    highest = []
+    for stamps, rows in series.values():
+        time = (stamps - start) * 1e-9
+        inside = (time >= begin) & (time < end)
+        if np.count_nonzero(inside) >= FEWEST:
+            highest += [_highest(time[inside], column[inside]) for column in rows.T]
+    moving = [f for f in highest if f > 0.0]
+    motion = 1.0 / (IN_A_PERIOD * float(np.median(moving))) if moving else WIDEST
+    return float(np.clip(min(slowest, motion), NARROWEST, WIDEST))
+
+
+def _highest(time: Array, values: Array) -> float:
+    """Frequency (Hz) below which most of a reading's power lies; 0 where it is noise, or not measured."""
+    if not np.isfinite(values).all() or not np.ptp(values) > 0.0:
+        return 0.0
+    power = np.abs(np.fft.rfft((values - np.mean(values)) * np.hanning(values.size)))[1:] ** 2
+    if not np.max(power) > STANDS_OUT * np.median(power):
+        return 0.0
+    below = int(np.searchsorted(np.cumsum(power), POWER * np.sum(power)))
+    return (below + 1) / float(time[-1] - time[0])
 
 
 def _window(series: Mapping[str, tuple[Array, Array]], start: float) -> tuple[float, float]:
