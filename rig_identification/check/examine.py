@@ -19,7 +19,6 @@ from rig_identification.check.stamps.streams import in_order
 from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
 
-
 #: Order of the examiners of stamps after which stamps that jump are mended. What is still out of order then
 #: are messages that overtook others on their way: a stamp that was set on arrival is never one of them.
 MENDED = 60

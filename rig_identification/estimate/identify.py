@@ -275,12 +275,15 @@ def start_of(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Pr
     return _measured_start(problem, theta, held, progress)
 
 
-def _begun(problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress) -> Start:
+def _begun(
+    problem: Problem, theta: Array, held: tuple[Run, ...], progress: Progress, *, soft_asked: bool = False
+) -> Start:
     """Where the fit of a session starts, with what its model can follow from there.
 
+    soft_asked: rest is asked whether the cables stretch, whatever the rig.
     Raises CannotBeFollowed where that is nothing.
     """
-    soft = where_they_stretch(problem, theta)
+    soft = where_they_stretch(problem, theta, asked=soft_asked)
     if soft is None:
         try:
             return _followed(problem, theta, held, progress)
@@ -303,11 +306,20 @@ def _followed(problem: Problem, theta: Array, held: tuple[Run, ...], progress: P
     return replace(start, problem=moving.problem, point=moving.point, unfollowed=names)
 
 
-def fit_session(session: Session, progress: Progress = _silent, assumed: Assumed | None = None) -> Fitted:
-    """Fit the ideal model to a session and predict its held-out runs."""
+def fit_session(
+    session: Session,
+    progress: Progress = _silent,
+    assumed: Assumed | None = None,
+    *,
+    soft_asked: bool = False,
+) -> Fitted:
+    """Fit the ideal model to a session and predict its held-out runs.
+
+    soft_asked: rest is asked whether the cables stretch, whatever the rig (estimate/stretching.py).
+    """
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
-    fitted = fit_from(_begun(problem, theta, held, progress), progress)
+    fitted = fit_from(_begun(problem, theta, held, progress, soft_asked=soft_asked), progress)
     noisy = noise_at_rest.told(slow_noise(problem.rests))
     notes = (*told((*problem.runs, *held)), *note_of_center(problem), *noisy)
     fitted = replace(fitted, notes=(*notes, *fitted.notes))

@@ -1,10 +1,10 @@
 """How strong a device's noise is at the frequencies of the motion, as it shows where the body hangs at rest.
 
-Real sensors' noise is not white: a filter takes its upper part, an amplifier and a bias that wanders add to its
-lower part. One std of a sample, as a description has it, is then too small where the body moves, by the root of
-the spectrum there over its mean. A fit that believes it claims too much, and finds physics in noise. At rest
-nothing else moves: the median ordinate of the spectrum there is ln 2 times the mean one (exponential law), and
-neither a residual swing nor a line of the mains moves it.
+Real sensors' noise is not white: a filter takes its upper part, an amplifier and a bias that wanders add to
+its lower part. One std of a sample, as a description has it, is then too small where the body moves, by the
+root of the spectrum there over its mean. A fit that believes it claims too much, and finds physics in noise.
+At rest nothing else moves: the median ordinate of the spectrum there is ln 2 times the mean one (exponential
+law), and neither a residual swing nor a line of the mains moves it.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ Array = NDArray[np.float64]
 
 #: Hz up to which a rig moves, and the share of the samples' rate that this is at most.
 MOTION, SHARE = 10.0, 0.125
-#: Ordinates of the spectrum that are left out at its lower end, where a zero drifts, and the fewest that tell.
+#: Ordinates of the spectrum that are left out at its lower end, where a zero drifts, and the fewest that
+#: tell.
 DRIFTING, FEWEST = 3, 24
-#: Std of a median of n exponential ordinates over their mean, times sqrt(n); and in how many of them noise that
-#: is white is not told.
+#: Std of a median of n exponential ordinates over their mean, times sqrt(n); and in how many of them noise
+#: that is white is not told.
 MEDIAN_STD, CHANCE = 1.44, 4.0
 
 #: Device and quantity.

@@ -94,13 +94,12 @@ class Stretched:
     gain: float | None  # nats by which rest is explained better than by inextensible cables; None: not known
 
 
-def where_they_stretch(problem: Problem, theta: Array) -> Stretched | None:
+def where_they_stretch(problem: Problem, theta: Array, *, asked: bool = False) -> Stretched | None:
     """The problem with cables that stretch, where more than needed hold the body and rest asks for it.
 
-    theta (p,): of a first guess. None where inextensible cables do.
+    theta (p,): of a first guess. asked: rest is asked in any case. None where inextensible cables do.
     """
-    rig = problem.bench.rig
-    if not redundant(rig):
+    if not (asked or redundant(problem.bench.rig)):
         return None
     soft = with_stretch(problem, theta)
     rests = problem.rests or _means_of_runs(problem)

@@ -84,6 +84,10 @@ class PlantEffects:
     air_drag: float = 0.0  # m^2, Cd A
     air_plates: Array = field(default_factory=lambda: np.zeros(2))  # m^2, Cd A of sides facing body x and y
     plate_reach: float = 0.5  # m
+    air_plate: float = 0.0  # m^2, Cd A of one flat side
+    air_plate_normal: Array = field(default_factory=lambda: np.zeros(2))  # rad, azimuth and elevation, body
+    air_plate_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
+    spin: Array = field(default_factory=lambda: np.zeros(3))  # N m s, body: of what spins on the body
     turning_cube: float = 0.0  # N m
     air_added_mass: float = 0.0  # kg
     exciter_rotor: float = 0.0  # kg
@@ -132,6 +136,10 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.DRAG_AREA] = effects.air_drag
     physics[block + place.PLATES : block + place.PLATES + 2] = effects.air_plates
     physics[block + place.PLATE_REACH] = effects.plate_reach
+    physics[block + place.AIR_PLATE] = effects.air_plate
+    physics[block + place.AIR_PLATE_NORMAL : block + place.AIR_PLATE_NORMAL + 2] = effects.air_plate_normal
+    physics[block + place.AIR_PLATE_POINT : block + place.AIR_PLATE_POINT + 3] = effects.air_plate_point
+    physics[block + place.SPIN : block + place.SPIN + 3] = effects.spin
     physics[block + place.TURNING_CUBE] = effects.turning_cube
     physics[block + place.ADDED_MASS] = effects.air_added_mass
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor

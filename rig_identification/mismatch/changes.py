@@ -1,11 +1,12 @@
-"""A number of the rig, of a device or of the body that changes at an instant, and is another one from then on.
+"""A number of the rig, of a device or of the body that changes at an instant, and is another one from then
+on.
 
 A clamp slips, an IMU is bumped, a zero jumps, a mass is taken off the body between two recordings. Any number
-that is wrong all the time may be wrong from an instant on, or in one recording alone. Of a number's column j of
-the whitened Jacobian such a change has the rows after that instant. What a change of the rig does to the motion
-it does from a start of its own, which takes twelve more columns: those of the run's start, after that instant.
-With everything that is free anyway eliminated (beyond.py), a group of k such columns has information F and
-gradient g, in units of its prior, and adds to the log evidence (Laplace, MacKay, ch. 28)
+that is wrong all the time may be wrong from an instant on, or in one recording alone. Of a number's column j
+of the whitened Jacobian such a change has the rows after that instant. What a change of the rig does to the
+motion it does from a start of its own, which takes twelve more columns: those of the run's start, after that
+instant. With everything that is free anyway eliminated (beyond.py), a group of k such columns has
+information F and gradient g, in units of its prior, and adds to the log evidence (Laplace, MacKay, ch. 28)
     1/2 g^T (F + 1)^-1 g - 1/2 log det(F + 1).
 From that the logarithm of the number of hypotheses is taken. A change between two recordings is as likely
 beforehand as one within any of them.
@@ -31,6 +32,7 @@ from rig_identification.mismatch.screen import Promise, opened_with, promise_of
 from rig_identification.model import layout
 from rig_identification.model.body import linear_in_log_cholesky
 from rig_identification.model.definite import definite
+from rig_identification.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -72,6 +74,11 @@ class Change:
         durations = {**self.durations, **recordings}
         return replace(self, stretches=(*self.stretches, *map(Stretch, recordings)), durations=durations)
 
+    def with_fewer(self, candidates: list[Candidate]) -> list[Change]:
+        """Changes of fewer numbers in the same stretches. candidates: what may be wrong all the time."""
+        fewer = (c for c in candidates if changeable(c) and len(c.parameters) < len(self.group.numbers))
+        return [replace(self, group=Group(c.parameters, np.zeros((0, len(c.parameters))), c)) for c in fewer]
+
     @property
     def within(self) -> Stretch | None:
         """The stretch that begins within its recording; None where it happened between two of them."""
@@ -99,9 +106,15 @@ def likeliest_changes(
     ranked = sorted(best.values(), key=lambda told: -told.net)
     ranked = [t for t in ranked[:ALIKE] if t.net > SHARE * ranked[0].net]
     finer = [max([t, *asked.near(t)], key=lambda told: told.net) for t in ranked]
-    durations = {r.recording.name: r.recording.duration for r in (*problem.rests, *problem.runs)}
+    durations = {name: r.duration for name, r in recordings_of(problem).items()}
     changes = [Change(groups[t.group], t.stretches, t.net, durations) for t in finer]
     return sorted(changes, key=lambda change: -change.net), always
+
+
+def recordings_of(problem: Problem) -> dict[str, Recording]:
+    """Recordings of a problem by name, those at rest first."""
+    every = [*(rest.recording for rest in problem.rests), *(run.recording for run in problem.runs)]
+    return {recording.name: recording for recording in every}
 
 
 def changeable(candidate: Candidate) -> bool:
@@ -232,8 +245,8 @@ class _Asked:
 
     def _recordings(self) -> list[str]:
         """Names of all recordings, the oldest first where their stamps tell."""
-        found = {r.recording.name: r.recording.start_ns for r in (*self._problem.rests, *self._problem.runs)}
-        return sorted(found, key=lambda name: found[name])
+        found = recordings_of(self._problem)
+        return sorted(found, key=lambda name: found[name].start_ns)
 
     def _between(self) -> list[tuple[str, ...]]:
         """Sets of recordings in which a number may be another one than in the others."""
@@ -332,7 +345,7 @@ class _Asked:
 
     def _inner(self, part: _Part, stretches: tuple[Stretch, ...], starts: int | None) -> Array:
         """(q, q) information of the restricted columns with one another: both are the same rows'."""
-        own = self._maps.T @ part.cross[: self._size]
+        own: Array = self._maps.T @ part.cross[: self._size]
         if not starts:
             return own
         # The start's columns show in one run's rows alone, where ``part`` has them as unknowns as well

@@ -12,6 +12,7 @@ from rig_identification.estimate.parameters import INERTIAL, ParameterSet
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.own_effects import own_hypotheses
+from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.tethers import tethers
 from rig_identification.model import layout
 from rig_identification.model.body import (
@@ -35,6 +36,11 @@ TWISTED = 0.005
 CLAMPED = 0.1
 #: ... and no body is held further askew than this.
 ASKEW = 3.0 * CLAMPED
+#: rad: a flat side faces a body's axis but for so much.
+FACING = 0.5
+#: rad/s: angular momentum of what spins on a body over its own inertia. A rotor of 10 kg and 0.1 m radius at
+#: 3000 rpm has 16 N m s, on a car of 1000 kg and 2 m that is 0.004.
+SPINNING = 0.02
 #: kg/m: what hangs a body is what is at hand, and strong enough many times over, however light the body is. A
 #: wire rope of 16 mm weighs 1 kg/m, a chain of 13 mm 3.8 kg/m.
 HEAVY_CABLE = 1.0
@@ -106,6 +112,8 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             name_in_result="added_mass",
             everywhere=True,
         ),
+        *_air_plates(rig, size, block),
+        _spinning_part(mass * size**2, block),
         _cable_mass(rig, block),
         *_cable_torsion(mass * rig.gravity, block),
         *tethers(rig, mass),
@@ -128,6 +136,57 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     if parameters.model.physics[block + place.GYROSCOPIC_SHARE] != 0.0:
         out.append(_gyroscopic_term(block, float(parameters.model.physics[block + place.GYROSCOPIC_SHARE])))
     return out
+
+
+def _air_plates(rig: Rig, size: float, block: int) -> list[Candidate]:
+    """Air against one flat side, facing about along each of the body's axes. size: m, of the rig."""
+    out = []
+    for axis, normal in (("x", (0.0, 0.0)), ("y", (0.5 * np.pi, 0.0)), ("z", (0.0, 0.5 * np.pi))):
+        area = added("air.plate_area", "m^2", 3.0 * size**2, block + place.AIR_PLATE)
+        angles = tuple(
+            added(f"air.plate_{name}", "rad", FACING, block + place.AIR_PLATE_NORMAL + i, normal[i])
+            for i, name in enumerate(("azimuth", "elevation"))
+        )
+        point = tuple(
+            added(
+                f"air_drag.point.{a}", "m", 0.3 * size, block + place.AIR_PLATE_POINT + i, middle_of(rig)[i]
+            )
+            for i, a in enumerate("xyz")
+        )
+        out.append(
+            Candidate(
+                "air_drag",
+                (area, *angles, *point),
+                f"The air resists at a flat side that faces {axis}, with the square of speed along that: a "
+                "drag area of {value}.",
+                "Keep speeds low, cover or take off what catches the air, or keep the drag in the model.",
+                {"channel": None, "axis": axis},
+                positive=1,
+                name_in_result="drag_area",
+            )
+        )
+    return out
+
+
+def _spinning_part(inertia: float, block: int) -> Candidate:
+    """Something that spins on the body: its angular momentum. inertia: kg m^2, of such a body."""
+    spins = tuple(
+        added(f"spin.{a}", "N*m*s", SPINNING * inertia, block + place.SPIN + i) for i, a in enumerate("xyz")
+    )
+
+    def told(found: Estimates) -> Told:
+        each: Told = {f"angular_momentum_{q.name[-1]}": (*found.of(q.name), q.unit) for q in spins}
+        return {"angular_momentum": max(each.values(), key=lambda one: abs(one[0])), **each}
+
+    return Candidate(
+        "unknown",
+        spins,
+        "Something spins on the body, a motor's rotor or a flywheel: its angular momentum is {value} along "
+        "one of the body's axes.",
+        "Stop it, or keep its angular momentum in the model.",
+        {"channel": None, "axis": None, "law": "spinning part"},
+        tell=told,
+    )
 
 
 def _cable_torsion(weight: float, block: int) -> list[Candidate]:

@@ -1,7 +1,8 @@
-"""Something that changed at an instant: found as a number that is another one from then on, and fitted as such.
+"""Something that changed at an instant: found as a number that is another one from then on, and fitted as
+such.
 
-It comes before the search where it adds more to the log evidence than anything that is wrong all the time, and
-after it beside the likeliest effects. As with an event, what it leaves of the session is searched.
+It comes before the search where it adds more to the log evidence than anything that is wrong all the time,
+and after it beside the likeliest effects. As with an event, what it leaves of the session is searched.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.changes import Change, likeliest_changes
+from rig_identification.mismatch.changes import Change, likeliest_changes, recordings_of
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
 from rig_identification.mismatch.pulse import all_runs
-from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.screen import Promise, adding, carried, extended, screen
 from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
+from rig_identification.model.definite import definite
 from rig_identification.result import Finding, Mismatch
 from rig_identification.search.events import OUTSIDE, Event, all_without, wrong
 from rig_identification.search.ladder import Rung
@@ -38,16 +40,20 @@ Explain = Callable[[Ideal], Explained | None]
 
 #: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
 MEANT = 3.0
+#: Share of what a change takes away that another one, to first order, may fail to take away and be fitted in
+#: its stead: of a change of hundreds of standard deviations first order knows no more.
+ALIKE = 0.02
 #: Half of what is cut out about the instant of a change, s: so exactly is it known.
 ABOUT = 0.1
 
 
 def changes_of(fitted: Fitted, first: Rung) -> list[Change]:
-    """Changes of which the likeliest adds more to the log evidence than anything that is wrong all the time.
+    """Changes that are worth a fit, the likeliest first.
 
-    first: the model at its own level. Where it needs no wrench held-out runs are asked as well. What swings
-    or pulls, at any frequency or place, takes longest to ask, and comes last; not at all where near the noise
-    the change has the larger part of what is wrong.
+    first: the model at its own level. Where that needs no wrench held-out runs are asked as well, and the
+    likeliest change has to add more to the log evidence than anything that is wrong all the time. What swings
+    or pulls, at any frequency or place, takes longest to ask, and comes last; not at all where the change has
+    the larger part of what is wrong. Elsewhere it has to add more than the same numbers wrong all the time.
     """
     seen = _linearised(fitted, first)
     if seen is None:
@@ -57,14 +63,20 @@ def changes_of(fitted: Fitted, first: Rung) -> list[Change]:
     candidates = catalogue(problem)
     count = count_of(candidates)
     changes, always = likeliest_changes(problem, evaluation, mass, candidates)
-    most = changes[0].net if changes else 0.0
+    if not changes or changes[0].net < MEANT:
+        return []
+    if not first.alone:
+        # Beside a strong wrench, about a body that is bent to all of it, first order ranks the same numbers
+        # over time; which ones they are a fit has to say
+        own = [p.gain for p in always if p.candidate is changes[0].group.of]
+        return changes if changes[0].net > max(own, default=0.0) + MEANT else []
 
     def likelier(promises: list[Promise]) -> bool:
-        return most > max((net_gain(p, count) for p in promises), default=0.0)
+        return changes[0].net > max((net_gain(p, count) for p in promises), default=0.0)
 
-    if most < MEANT or not likelier(always):
+    if not likelier(always):
         return []
-    if first.alone and most > (1.0 - OUTSIDE) * wrong(fitted):
+    if changes[0].net > (1.0 - OUTSIDE) * wrong(fitted):
         return changes
     return changes if likelier(screen(problem, evaluation, candidates, mass)) else []
 
@@ -92,10 +104,13 @@ def explained_changed(
             continue
         if best is None or wrong(found.fitted) < wrong(best.fitted):
             best = found
+        if wrong(best.fitted) > OUTSIDE * wrong(fitted):
+            return None
         if judged(best.fitted)[1].verdict == "none":
             break
-    if best is None or wrong(best.fitted) > OUTSIDE * wrong(fitted):
+    if best is None:
         return None
+    best = _simpler(fitted, best, notify)
     rest = Ideal(best.fitted, *judged(best.fitted))
     told = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
     if told.mismatch.verdict not in ("none", "explained") or told.trace:
@@ -109,15 +124,57 @@ class Changed(NamedTuple):
     fitted: Fitted
     candidate: Candidate
     own: bool  # whether held-out recordings alone tell of it
+    change: Change
+
+
+def _simpler(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
+    """The same session with fewer numbers that change, where these explain as much.
+
+    A hinge that moves along its cable is a cable that became longer. About the fit, with the numbers a of the
+    change among its unknowns, those of another one in their stead cost a^T S a / 2 nats, S being what of a's
+    information neither they nor anything else that is free accounts for. The one that costs least is fitted.
+    """
+    problem, evaluation = best.fitted.problem, best.fitted.evaluation
+    parameters = problem.bench.parameters
+    own = [parameters.index_of(p.name) for p in best.candidate.parameters]
+    others = best.change.with_fewer(catalogue(problem))
+    if best.own or not others or judged(best.fitted)[1].verdict != "none":
+        return best
+    wide = adding(problem, [c.candidate for c in others])
+    full = evaluate(wide, carried(wide, problem, evaluation.point))
+    if full is None:
+        return best
+    indices = [[wide.bench.parameters.index_of(p.name) for p in c.candidate.parameters] for c in others]
+    asked = np.array([*own, *(i for columns in indices for i in columns)])
+    base = np.setdiff1d(np.arange(full.information.shape[0]), asked)
+    across = full.information[np.ix_(base, asked)]
+    solved = np.linalg.solve(definite(full.information[np.ix_(base, base)]), across)
+    left = full.information[np.ix_(asked, asked)] - across.T @ solved
+    a, first, costs = evaluation.point.theta[own], len(own), []
+    for columns in indices:
+        other = np.arange(first, first + len(columns))
+        first += len(columns)
+        seen = left[other][:, : len(own)]
+        S = left[: len(own), : len(own)] - seen.T @ np.linalg.solve(
+            definite(left[np.ix_(other, other)]), seen
+        )
+        costs.append(float(a @ S @ a))
+    k = int(np.argmin(costs))
+    if costs[k] > ALIKE * float(a @ left[: len(own), : len(own)] @ a):
+        return best
+    again = _fitted_with(fitted, others[k], others[k].candidate, notify)
+    if again is None or judged(again)[1].verdict != "none":
+        return best
+    return Changed(again, others[k].candidate, best.own, others[k])
 
 
 def _fitted_best(fitted: Fitted, change: Change, notify: Notify) -> Changed | None:
     """The session fitted anew with a change, lasting or not; None where that cannot be."""
     candidate, own = _told_by_held_runs(fitted, change)
-    every = [candidate, *(c.candidate for c in _lasting(fitted, change))]
     notify(f"search: {candidate.label} that changes", 0.1)
-    fits = [(_fitted_with(fitted, change, c, notify), c) for c in every]
-    known = [Changed(again, c, own) for again, c in fits if again is not None]
+    every = [(candidate, change), *((c.candidate, c) for c in _lasting(fitted, change))]
+    fits = [(_fitted_with(fitted, change, told, notify), told, of) for told, of in every]
+    known = [Changed(again, told, own, of) for again, told, of in fits if again is not None]
     return min(known, key=lambda k: wrong(k.fitted), default=None)
 
 
@@ -126,7 +183,7 @@ def _lasting(fitted: Fitted, change: Change) -> list[Change]:
     held = {r.recording.name: r.recording for r in (*fitted.holdout_runs, *fitted.lost)}
     if not change.durations.keys().isdisjoint(held):
         return []
-    used = {r.recording.name: r.recording for r in (*fitted.problem.rests, *fitted.problem.runs)}
+    used = recordings_of(fitted.problem)
     since = min(used[s.recording].start_ns for s in change.stretches)
     later = {name: r.duration for name, r in held.items() if r.start_ns > since}
     return [change.lasting(later)] if later else []
@@ -189,7 +246,7 @@ def _told_by_held_runs(fitted: Fitted, change: Change) -> tuple[Candidate, bool]
     What is another number in a held-out run alone is that run's own, as its start is. No fitted run says
     anything of it, and it says nothing of what they are fitted with.
     """
-    used = {r.recording.name for r in (*fitted.problem.runs, *fitted.problem.rests)}
+    used = recordings_of(fitted.problem)
     if any(s.recording in used for s in change.stretches):
         return change.candidate, False
     plain, point = all_runs(fitted)

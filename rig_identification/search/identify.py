@@ -109,6 +109,13 @@ def _driven(
 ) -> Identification:
     """The answer to a session, without the runs that a force drives which was not recorded."""
     found, ideal = _identified(session, notify, assumed, work, watcher)
+    if _nothing_follows(found, ideal):
+        try:
+            soft, its = _identified(session, notify, assumed, work, watcher, soft_asked=True)
+        except KeyboardInterrupt as stopped:
+            raise Interrupted(interrupted(found)) from stopped
+        if its.stretch is not None and (soft.mismatch.findings or soft.mismatch.verdict == "none"):
+            found, ideal = both_accounted(soft, found), its
     less = None
     if found.mismatch.verdict == "unexplained" and all(
         f.effect == "unknown" for f in found.mismatch.findings
@@ -122,6 +129,16 @@ def _driven(
             raise Interrupted(interrupted(found)) from stopped
         found = _without_unseen(found, rest, less.note)
     return with_stretch_told(found, ideal)
+
+
+def _nothing_follows(found: Identification, ideal: Fitted) -> bool:
+    """Whether no wrench follows what the sensors show, so that nothing could be searched.
+
+    A body that hangs decimetres lower on soft ropes than on rigid ones is elsewhere all the time: no force on
+    it brings rigid cables there, and rest is asked whether they stretch.
+    """
+    nothing = found.mismatch.verdict == "unexplained" and not found.mismatch.findings
+    return nothing and ideal.stretch is None and not only_watched(ideal.problem)
 
 
 def _without_unseen(found: Identification, rest: Identification, note: str) -> Identification:
@@ -172,7 +189,13 @@ def _firm(found: Explained) -> bool:
 
 
 def _identified(
-    session: Session, notify: Progress, assumed: Assumed | None, work: float, watcher: Watcher | None
+    session: Session,
+    notify: Progress,
+    assumed: Assumed | None,
+    work: float,
+    watcher: Watcher | None,
+    *,
+    soft_asked: bool = False,
 ) -> tuple[Identification, Fitted]:
     """The answer to a session, and the ideal model's fit. Raises Interrupted once there is an answer."""
 
@@ -180,7 +203,7 @@ def _identified(
         notify(stage, IDEAL_SHARE * fraction)
 
     budget = Budget(work)
-    fitted = fit_session(session, fitting, assumed)
+    fitted = fit_session(session, fitting, assumed, soft_asked=soft_asked)
     so_far = SoFar(session, Ideal(fitted, *judged(fitted)), budget, watcher=watcher)
     try:
         so_far.show()

@@ -10,6 +10,7 @@ from numba import njit
 
 from rig_identification.model.effects.air_added_mass import add_air_added_mass
 from rig_identification.model.effects.air_drag import add_air_drag
+from rig_identification.model.effects.air_plate import add_air_plate
 from rig_identification.model.effects.air_plates import add_air_plates
 from rig_identification.model.effects.cable_mass import add_cable_mass
 from rig_identification.model.effects.cable_torsion import add_cable_torsion
@@ -24,6 +25,7 @@ from rig_identification.model.effects.internal import add_internal
 from rig_identification.model.effects.own import add_own, own_active
 from rig_identification.model.effects.place import (
     ADDED_MASS,
+    AIR_PLATE,
     BENDING,
     DAMPING,
     DRAG_AREA,
@@ -37,6 +39,7 @@ from rig_identification.model.effects.place import (
     ROLL_STIFFNESS,
     ROTOR_MASS,
     SHARING,
+    SPIN,
     TETHER_POINT,
     TETHER_STIFFNESS,
     TORSION,
@@ -44,6 +47,7 @@ from rig_identification.model.effects.place import (
     active,
 )
 from rig_identification.model.effects.point_law import add_point_law
+from rig_identification.model.effects.spinning_part import add_spinning_part
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.effects.turning_cube import add_turning_cube
 from rig_identification.model.layout import BODY_STATE, CABLE_SIZE, CABLES, CEILING, INTERNAL_SIZE, KIND
@@ -89,7 +93,8 @@ def effects_follow(physics, modes, internal):  # type: ignore[no-untyped-def]
     for i in range(TETHER_POINT):
         if active(physics[block + i]):
             turn = True
-            place = place or i not in (ADDED_MASS, ROTOR_MASS, GYROSCOPIC_SHARE, TURNING_CUBE)
+            turns_alone = i in (ADDED_MASS, ROTOR_MASS, GYROSCOPIC_SHARE, TURNING_CUBE)
+            place = place or not (turns_alone or SPIN <= i < SPIN + 3)
     own = own_active(physics, block)
     return place or own, turn or own
 
@@ -123,6 +128,10 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
         add_exciter_rotor(physics, block, x, R, K, r)
     if active(physics[block + GYROSCOPIC_SHARE]):
         add_gyroscopic_share(physics, block, x, r)
+    if _any_active(physics, block + SPIN, 3):
+        add_spinning_part(physics, block, x, r)
+    if active(physics[block + AIR_PLATE]):
+        add_air_plate(physics, block, x, R, r)
     if _any_active(physics, block + TETHER_STIFFNESS, 6):
         add_tether(physics, block, x, R, r)
     if _any_active(physics, block + LAW_SPRING, 5):

@@ -15,8 +15,8 @@ from rig_identification.examination import SetupFault
 
 #: A cell whose scale is off by more than this factor has no calibration at all.
 FAR = 2.0
-#: A cell of its own scale and zero is told from a calibrated one where one of them is off by more than this share
-#: of what it reads, and by more of its std than chance makes.
+#: A cell of its own scale and zero is told from a calibrated one where one of them is off by more than this
+#: share of what it reads, and by more of its std than chance makes.
 OFF, CHANCE = 0.1, 3.0
 
 
@@ -62,8 +62,7 @@ def _counted(
     def possible(rest: RestFit) -> bool:
         parts = ((rest.value("gain"), 1.0), (rest.value("zero"), factor * reads))
         return uncalibrated or any(
-            bool(np.any((np.abs(v) > OFF * scale) & (np.abs(v) > CHANCE * std)))
-            for (v, std), scale in parts
+            bool(np.any((np.abs(v) > OFF * scale) & (np.abs(v) > CHANCE * std))) for (v, std), scale in parts
         )
 
     def describe(rest: RestFit | None) -> SetupFault:
