@@ -1,0 +1,76 @@
+"""What spins on the body, and air against one side of it: energy, a limit case, derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from test_model_conservation import kinetic_and_potential
+from test_model_derivatives import check_physics, drive_of
+from test_model_gyroscopic import falling, spinning
+from test_model_rigs import moving, random_sample, thesis_case_14
+
+from rig_identification.model import layout
+from rig_identification.model.effects import place
+from rig_identification.model.motion import Input, RigModel, simulate
+
+Array = NDArray[np.float64]
+H = np.array([30.0, -80.0, 50.0])
+
+
+def having(model: RigModel, **numbers: Array | float) -> RigModel:
+    """The model with numbers of its effects' block, by their place's name."""
+    physics = model.physics.copy()
+    for name, values in numbers.items():
+        first = place.effects_block(model.cables) + getattr(place, name)
+        own = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        physics[first : first + own.size] = own
+    return model.with_physics(physics)
+
+
+def test_a_falling_body_with_a_rotor_keeps_its_angular_momentum() -> None:
+    """About its centre of mass, in the world: R (J w + H), H being the rotor's."""
+    sample = thesis_case_14()
+    motion = simulate(having(falling(sample), SPIN=H), spinning(sample), Input.none(101, 0.01))
+    xx, xy, xz, yy, yz, zz = sample.elements[4:]
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    kept = np.einsum("nij,nj->ni", motion.R_world_body, motion.states[:, 9:12] @ J + H)
+    np.testing.assert_allclose(kept, np.tile(kept[0], (101, 1)), atol=1e-7 * np.linalg.norm(kept[0]))
+
+
+def test_a_rotor_neither_drives_nor_brakes_a_body_on_its_cables() -> None:
+    sample = random_sample(3, 3)
+    plain = sample.model()
+    state = moving(sample, plain, 3)
+    motion = simulate(having(plain, SPIN=H), state, Input.none(201, 0.01))
+    kinetic, potential = kinetic_and_potential(plain, motion)
+    assert np.ptp(kinetic) > 0.1 * np.max(kinetic)
+    assert np.ptp(kinetic + potential) < 1e-6 * np.max(kinetic)
+
+
+def test_a_plate_takes_out_what_air_against_it_does() -> None:
+    """Its power is -1/2 rho A |u|^3 at its place, u along its normal: x here."""
+    sample, at = random_sample(3, 3), np.array([0.4, 0.9, -0.3])
+    plain = sample.model()
+    state = moving(sample, plain, 3)
+    air = {"AIR_PLATE": 8.0, "AIR_PLATE_NORMAL": np.zeros(2), "AIR_PLATE_POINT": at}
+    motion = simulate(having(plain, **air), state, Input.none(401, 0.0025))
+    velocity = np.einsum("nji,nj->ni", motion.R_world_body, motion.states[:, 6:9])
+    u = (velocity + np.cross(motion.states[:, 9:12], at))[:, 0]
+    power = 0.5 * 1.2 * 8.0 * np.abs(u) ** 3
+    kinetic, potential = kinetic_and_potential(plain, motion)
+    lost = (kinetic + potential)[0] - (kinetic + potential)[-1]
+    assert lost == pytest.approx(np.trapezoid(power, dx=0.0025), rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_every_number_of_both(seed: int) -> None:
+    sample = random_sample(seed, 3)
+    air = {"AIR_PLATE": 3.0, "AIR_PLATE_NORMAL": np.array([0.4, 0.3]), "AIR_PLATE_POINT": np.full(3, 0.2)}
+    model = having(sample.model(rods=True), SPIN=0.1 * H, **air)
+    block = layout.effects_offset(model.cables)
+    entries = [block + place.SPIN + i for i in range(3)]
+    entries += [block + place.AIR_PLATE, *(block + place.AIR_PLATE_NORMAL + i for i in range(2))]
+    entries += [block + place.AIR_PLATE_POINT + i for i in range(3)]
+    entries += [layout.INERTIAL + 4, layout.CABLES + layout.LENGTH]
+    check_physics(model, moving(sample, model, seed), drive_of(61, 0.01, seed), entries, 5e-6)
