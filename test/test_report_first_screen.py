@@ -24,10 +24,17 @@ from rig_identification.report.grades import grade, heat, noise_limit
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.labels import LETTER, LINE
 from rig_identification.report.lights import lights
+from rig_identification.report.narrower import narrower
 from rig_identification.report.rig_drawing import picture_svg, rig_svgs
 from rig_identification.report.rig_scene import described_scene, rig_scene
 from rig_identification.report.words import title
-from rig_identification.result import ELEMENTS, ChannelFit, Identification, ParameterEstimate
+from rig_identification.result import (
+    ELEMENTS,
+    ChannelFit,
+    Identification,
+    ParameterEstimate,
+    UncertaintySource,
+)
 from rig_identification.rig import Cable, Rig
 
 
@@ -269,3 +276,29 @@ def test_truth_is_never_listed_as_used(identification: Identification, session: 
     run = replace(session.recordings[2], quality=(truth,))
     page = Page(render_report(identification, replace(session, recordings=(*session.recordings[:2], run))))
     assert re.search(r"ground_truth/odometry 4321 truth", page.text)
+
+
+def test_what_narrows_the_intervals_stands_with_its_gain(
+    identification: Identification, session: Session
+) -> None:
+    """Of a variance of 1 three quarters are noise, of which as long a run again takes half."""
+    total = identification.total
+    variances = np.zeros(10)
+    variances[9] = 1.0
+    worst = np.diag(variances + 1e-9)
+    sources = tuple(
+        UncertaintySource(name, kind, share * worst)
+        for name, kind, share in (
+            ("imu angular rate", "noise", 0.5),
+            ("imu angular rate at rest", "rest", 0.25),
+            ("tolerance.cable_length", "tolerance", 0.24),
+            ("ground scale", "scale", 0.01),
+        )
+    )
+    told = narrower(replace(identification, total=replace(total, covariance=worst, sources=sources)))
+    assert [step.what.partition(" ")[0] for step in told] == ["Record", "Measure"]
+    assert told[0].share == pytest.approx(1.0 - np.sqrt(1.0 - 0.375))
+    assert told[1].share == pytest.approx(1.0 - np.sqrt(0.76))
+    assert told[1].gain == "Jzz ± 2.0 to ± 1.7 kg m²"
+    assert "cable length" in told[1].what
+    assert narrower(replace(identification, total=replace(total, sources=()))) == []

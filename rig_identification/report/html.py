@@ -16,6 +16,7 @@ from rig_identification.report.findings import alternative_views, finding_views,
 from rig_identification.report.grades import grade
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.lights import lights
+from rig_identification.report.narrower import narrower
 from rig_identification.report.page import page_environment, script, vendored
 from rig_identification.report.replay import replay_json
 from rig_identification.report.residual_views import rms_table, whiteness_views
@@ -87,6 +88,7 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "marked": ", ".join(sorted(scene.marked | {name for name, _ in scene.spots})),
         "lights": lights(identification),
         "steps": next_steps(identification, session),
+        "narrower": narrower(identification),
         "grade": grade,
         "textbook": textbook_views(identification),
         "blocks": ten,
