@@ -33,9 +33,10 @@ from rig_identification.result import (
     ChannelFit,
     Identification,
     ParameterEstimate,
+    Quantity,
     UncertaintySource,
 )
-from rig_identification.rig import Cable, Rig
+from rig_identification.rig import Cable, Rig, WheelContacts
 
 
 def still(recording: str, channel: str, off: float) -> ChannelFit:
@@ -302,3 +303,20 @@ def test_what_narrows_the_intervals_stands_with_its_gain(
     assert told[1].gain == "Jzz ± 2.0 to ± 1.7 kg m²"
     assert "cable length" in told[1].what
     assert narrower(replace(identification, total=replace(total, sources=()))) == []
+
+
+def test_a_vehicle_has_its_axle_loads_in_the_report(identification: Identification, session: Session) -> None:
+    quantities = (
+        Quantity("center_of_mass_height", 0.5, 2e-3, "m"),
+        Quantity("front_axle_share", 0.55, 1e-3, "1"),
+        Quantity("front_axle_load", 6474.0, 3.0, "N"),
+    )
+    wheels = WheelContacts(*(np.array([x, y, 0.0]) for x in (2.0, 0.0) for y in (0.8, -0.8)))
+    rig = replace(session.rig, vehicle=wheels)
+    text = Page(render_report(replace(identification, vehicle=quantities), replace(session, rig=rig))).text
+    assert "Front axle load" in text
+    assert "55.00" in text
+    assert "± 0.20" in text
+    assert "ISO 8855" in text
+    without = Page(render_report(replace(identification, vehicle=()), session)).text
+    assert "Front axle load" not in without

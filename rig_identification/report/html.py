@@ -27,6 +27,7 @@ from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
 from rig_identification.report.textbook import textbook_views
 from rig_identification.report.to_copy import to_copy
+from rig_identification.report.vehicle import vehicle_view
 from rig_identification.result import Identification
 
 #: How the topic of a simulation's truth ends (recording contract).
@@ -91,6 +92,7 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "narrower": narrower(identification),
         "grade": grade,
         "textbook": textbook_views(identification),
+        "vehicle": vehicle_view(identification, wheels=session.rig.vehicle is not None),
         "blocks": ten,
         "principal": any(block.principal for block in ten),
         "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},
