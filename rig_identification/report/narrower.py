@@ -14,7 +14,7 @@ import numpy as np
 
 from rig_identification.estimate.observability import natural_size
 from rig_identification.quantity import Z_95, significant, unit_text
-from rig_identification.report.findings import alternative_views
+from rig_identification.report.findings import AlternativeView, alternative_views
 from rig_identification.report.ten_numbers import UNITS
 from rig_identification.report.words import words
 from rig_identification.result import ELEMENTS, Identification, InertialEstimate
@@ -80,8 +80,13 @@ def _steps(identification: Identification, element: int) -> Iterator[tuple[str, 
     yield "Record as long again, with the runs that plan --after result.json chooses.", 0.5 * noise
     rivals = [view for view in alternative_views(identification.mismatch) if view.experiment]
     if rivals:
-        names = ", ".join(dict.fromkeys(view.where or view.effect for view in rivals))
+        names = ", ".join(dict.fromkeys(_called(view) for view in rivals))
         yield f"Decide on what these recordings leave open: {names}.", decide
+
+
+def _called(view: AlternativeView) -> str:
+    """An effect by name; what the contract has no word for, by its law."""
+    return view.effect if view.effect != "unknown" else view.where or view.effect
 
 
 def _told(element: int, variance: float, share: float) -> str:
