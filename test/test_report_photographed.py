@@ -155,8 +155,10 @@ def made_up(identification: Identification, explained: Identification) -> dict[s
     "name",
     [
         "clean",
-        "set_up",
-        *(pytest.param(n, marks=pytest.mark.long) for n in ("explained", "unexplained", "textbook", "tied")),
+        *(
+            pytest.param(n, marks=pytest.mark.long)
+            for n in ("set_up", "explained", "unexplained", "textbook", "tied")
+        ),
     ],
 )
 def test_six_answers_in_five_views(

@@ -59,17 +59,17 @@ def summary(plan: Plan) -> str:
 
 
 def tie_rows(plan: Plan) -> list[tuple[str, ...]]:
-    """Tie, how far apart so far, expected σ apart after the plan, chance of a decision, by what; as text."""
+    """Tie, what decides it, how far apart so far, expected σ apart after the plan, chance; as text."""
     rows: list[tuple[str, ...]] = []
     for d in plan.decisions:
         tie = f"{words(d.told)} or {words(d.rival)}" if d.told else f"whether there is {words(d.rival)}"
         so_far = f"{significant(np.sqrt(2.0 * d.gap), 2)} σ"
         if d.nats is None or d.chance is None:
-            rows.append((tie, so_far, "not known", "", d.experiment))
+            rows.append((tie, d.experiment, so_far, "not known", ""))
             continue
         by = d.best if d.decided else f"not by these runs: {d.experiment}" if d.experiment else "not by these"
         expected = significant(np.sqrt(2.0 * d.nats), 2)
-        rows.append((tie, so_far, f"{expected} σ", f"{100.0 * d.chance:.0f} %", by))
+        rows.append((tie, by, so_far, f"{expected} σ", f"{100.0 * d.chance:.0f} %"))
     return rows
 
 

@@ -127,7 +127,7 @@ def _print(found: Plan, out: Path) -> None:
         table.add_row(*row)
     Console().print(table)
     print(summary(found))
-    for tie, so_far, expected, chance, by in tie_rows(found):
+    for tie, by, so_far, expected, chance in tie_rows(found):
         sure = f", decides with a chance of {chance}" if chance else ""
         print(f"{tie}: {so_far} apart so far, {expected} expected{sure}: {by}")
     for planned in found.recordings:
