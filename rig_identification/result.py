@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -97,6 +98,8 @@ class Finding:
     statement: str
     advice: str = ""  # of a fault of the set-up: what to change
     correction: str = ""  # of a fault of the set-up: the corrected lines
+    #: The model's own parameters, each with its std, by which it can be built again
+    numbers: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

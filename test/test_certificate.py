@@ -152,6 +152,10 @@ def test_where_a_vehicle_has_its_weight(rig: Rig) -> None:
     assert values["center_of_mass_behind_front_axle"] == pytest.approx((0.5, 1e-3))
     assert values["rear_axle_share"] == pytest.approx((0.5 / 2.6, 1e-3 / 2.6))
     assert values["left_side_share"] == pytest.approx((0.55, 1e-3 / 1.6))
+    weight = 1200.0 * rig.gravity
+    assert values["rear_axle_load"][0] == pytest.approx(weight * 0.5 / 2.6)
+    assert values["front_axle_load"][0] + values["rear_axle_load"][0] == pytest.approx(weight)
+    assert values["rear_axle_load"][1] == pytest.approx(weight / 2.6 * np.hypot(1e-3, 0.5 * 0.5 / 1200))
     assert values["radius_of_gyration_yaw"][0] == pytest.approx(np.sqrt(1700.0 / 1200.0))
     assert values["radius_of_gyration_yaw"][1] == pytest.approx(
         0.5 * np.hypot(1 / 1700, 0.5 / 1200) * 1.1902, rel=1e-3

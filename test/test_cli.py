@@ -19,6 +19,7 @@ from rig_identification import __version__
 from rig_identification.cli.main import main
 from rig_identification.cli.output import write_together
 from rig_identification.cli.progress import QUIET_SECONDS, StageProgress
+from rig_identification.cli.searching import Searching
 from rig_identification.cli.summary import summary
 from rig_identification.errors import InputError
 from rig_identification.examination import Examination
@@ -330,6 +331,29 @@ def test_progress_where_nobody_watches_is_a_line_a_stage() -> None:
     assert stream.getvalue() == "fitting\ncovariance\n"
 
 
+def test_a_search_says_how_long_it_takes_at_most_and_the_numbers_so_far(
+    identification: Identification,
+) -> None:
+    """After 20 s a fifth of what the search may do is done: 80 s are left, and no more lines of the same."""
+    now, done = [0.0], [0.0]
+    stream = io.StringIO()
+    with StageProgress(stream, clock=lambda: now[0]) as progress:
+        searching = Searching(progress, 80.0, clock=lambda: now[0], done=lambda: done[0])
+        searching("first guess")
+        now[0], done[0] = 20.0, 20.0
+        searching("search: screening", 0.5)
+        searching("search: screening", 0.6)
+        searching.better(identification)
+        searching.better(identification)
+        now[0], done[0] = 80.0, 80.0
+        searching("search: whole runs", 0.9)
+    first, second, third = stream.getvalue().splitlines()
+    assert first == "search: screening (at most 1 min left)"
+    assert second.startswith("so far: m 1072.13 ± 0.78 kg, Jxx")
+    assert "Jzz" in second
+    assert third == "search: whole runs (at most 20 s left)"
+
+
 def test_progress_on_a_terminal_moves() -> None:
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
@@ -338,8 +362,10 @@ def test_progress_on_a_terminal_moves() -> None:
     stream = Terminal()
     with StageProgress(stream) as progress:
         progress("reading [run_1]")
-        progress("fitting", 0.5)
+        progress("fitting", 0.5, "at most 20 s left")
+        progress.say("so far: m [1] kg")
     assert "fitting" in stream.getvalue()
+    assert "so far: m [1] kg" in stream.getvalue()
 
 
 def test_summary_names_what_is_not_determinable(explained: Identification) -> None:

@@ -190,11 +190,11 @@ def test_the_choice_serves_the_element_that_is_known_worst(lab: Laboratory) -> N
     assert merit(0.5 * relative, ELEMENTS) < merit(relative, ELEMENTS)
     weak = Choice(replace(release(), name="weak"), 0.01 * motion)
     still = Choice(bare(Means(rest=4.0)), np.zeros_like(motion))
-    chosen = choose(lab, [weak, base, still], seconds=17.0, most=100.0, first=still)
+    chosen = choose(lab, [weak, base, still], seconds=17.0, most=100.0, first=[still])
     assert chosen.blocks() == {"static_bare": 1, "release": 3}
     shares = [worst(step.relative, chosen.determined) for step in chosen.steps]
     assert shares == sorted(shares, reverse=True)
-    short = choose(lab, [weak, base, still], seconds=100.0, most=8.0, first=still)
+    short = choose(lab, [weak, base, still], seconds=100.0, most=8.0, first=[still])
     assert short.blocks()["release"] == 2
 
 

@@ -24,11 +24,19 @@ from rig_identification.report.grades import grade, heat, noise_limit
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.labels import LETTER, LINE
 from rig_identification.report.lights import lights
+from rig_identification.report.narrower import narrower
 from rig_identification.report.rig_drawing import picture_svg, rig_svgs
 from rig_identification.report.rig_scene import described_scene, rig_scene
 from rig_identification.report.words import title
-from rig_identification.result import ELEMENTS, ChannelFit, Identification, ParameterEstimate
-from rig_identification.rig import Cable, Rig
+from rig_identification.result import (
+    ELEMENTS,
+    ChannelFit,
+    Identification,
+    ParameterEstimate,
+    Quantity,
+    UncertaintySource,
+)
+from rig_identification.rig import Cable, Rig, WheelContacts
 
 
 def still(recording: str, channel: str, off: float) -> ChannelFit:
@@ -269,3 +277,46 @@ def test_truth_is_never_listed_as_used(identification: Identification, session: 
     run = replace(session.recordings[2], quality=(truth,))
     page = Page(render_report(identification, replace(session, recordings=(*session.recordings[:2], run))))
     assert re.search(r"ground_truth/odometry 4321 truth", page.text)
+
+
+def test_what_narrows_the_intervals_stands_with_its_gain(
+    identification: Identification, session: Session
+) -> None:
+    """Of a variance of 1 three quarters are noise, of which as long a run again takes half."""
+    total = identification.total
+    variances = np.zeros(10)
+    variances[9] = 1.0
+    worst = np.diag(variances + 1e-9)
+    sources = tuple(
+        UncertaintySource(name, kind, share * worst)
+        for name, kind, share in (
+            ("imu angular rate", "noise", 0.5),
+            ("imu angular rate at rest", "rest", 0.25),
+            ("tolerance.cable_length", "tolerance", 0.24),
+            ("ground scale", "scale", 0.01),
+        )
+    )
+    told = narrower(replace(identification, total=replace(total, covariance=worst, sources=sources)))
+    assert [step.what.partition(" ")[0] for step in told] == ["Record", "Measure"]
+    assert told[0].share == pytest.approx(1.0 - np.sqrt(1.0 - 0.375))
+    assert told[1].share == pytest.approx(1.0 - np.sqrt(0.76))
+    assert told[1].gain == "Jzz ± 2.0 to ± 1.7 kg m²"
+    assert "cable length" in told[1].what
+    assert narrower(replace(identification, total=replace(total, sources=()))) == []
+
+
+def test_a_vehicle_has_its_axle_loads_in_the_report(identification: Identification, session: Session) -> None:
+    quantities = (
+        Quantity("center_of_mass_height", 0.5, 2e-3, "m"),
+        Quantity("front_axle_share", 0.55, 1e-3, "1"),
+        Quantity("front_axle_load", 6474.0, 3.0, "N"),
+    )
+    wheels = WheelContacts(*(np.array([x, y, 0.0]) for x in (2.0, 0.0) for y in (0.8, -0.8)))
+    rig = replace(session.rig, vehicle=wheels)
+    text = Page(render_report(replace(identification, vehicle=quantities), replace(session, rig=rig))).text
+    assert "Front axle load" in text
+    assert "55.00" in text
+    assert "± 0.20" in text
+    assert "ISO 8855" in text
+    without = Page(render_report(replace(identification, vehicle=()), session)).text
+    assert "Front axle load" not in without

@@ -12,7 +12,7 @@ from rig_identification.api.result import Result
 from rig_identification.api.simulating import Simulated
 
 if TYPE_CHECKING:
-    from rig_identification.identification import Prepared
+    from rig_identification.identification import Prepared, Watcher
     from rig_identification.recording import Session
 
 #: Called with a stage's name, and with how far it is from 0 to 1 where that is known.
@@ -34,6 +34,7 @@ def identify(
     topics: Mapping[str, str] | None = None,
     work: float | None = None,
     progress: Progress | None = None,
+    watcher: Watcher | None = None,
 ) -> Result:
     """Estimate the body of a session, and name the physics that the ideal model left out.
 
@@ -49,6 +50,9 @@ def identify(
         about two minutes on two cores.
     progress : callable, optional
         Called as ``progress(stage)`` or ``progress(stage, fraction)``.
+    watcher : callable, optional
+        Called with each better answer, an ``Identification``, while the search runs. The result stays the
+        same.
 
     Raises
     ------
@@ -65,7 +69,7 @@ def identify(
     prepared = _prepared(session, progress)
     digests = _digests(session, progress)
     try:
-        answer = identify_prepared(prepared, progress, work)
+        answer = identify_prepared(prepared, progress, work, watcher)
     except Interrupted as stopped:
         raise Stopped(Result(stopped.answer, prepared.session, digests)) from stopped
     return Result(answer, prepared.session, digests)

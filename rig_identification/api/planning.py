@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig_identification.api.identifying import Progress
 from rig_identification.errors import ArgumentError
@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rig_identification.plan import Means, Plan
+    from rig_identification.plan import Before, Known, Means, Plan, Stated
     from rig_identification.rig import Rig
+    from rig_identification.several.session_result import SessionResult
 
     Array = NDArray[np.float64]
 
@@ -67,17 +68,73 @@ class Planned:
         path.write_bytes(self.described)
 
 
-def plan_session(rig: str | Path, body: Array, means: Means, *, progress: Progress | None = None) -> Planned:
+def plan_session(
+    rig: str | Path,
+    body: Array,
+    means: Means,
+    *,
+    progress: Progress | None = None,
+    before: Before | None = None,
+) -> Planned:
     """Plan a session on the rig of a description.
 
     body: (10,) what the plan is for, see :func:`boxed` and :func:`given_body`. means: see :func:`means_of`.
-    Raises InputError.
+    before: an earlier session of the same body on that rig, see :func:`earlier`. Raises InputError.
     """
     from rig_identification.plan import plan
     from rig_identification.session import read_rig
 
     file = Path(rig)
-    return Planned(plan(read_rig(file), body, means, progress or _unseen), file.read_bytes())
+    return Planned(plan(read_rig(file), body, means, progress or _unseen, before), file.read_bytes())
+
+
+def earlier(path: Path) -> Before:
+    """What the ``result.json`` of an earlier session leaves open, and what it knows.
+
+    Ties are alternatives that trail by less than what counts as decided. Raises InputError where the file is
+    no result.
+    """
+    import json
+
+    import numpy as np
+
+    from rig_identification.plan import Before
+    from rig_identification.plan.apart import DECIDED
+    from rig_identification.report.result_file import read_result
+
+    result = read_result(path, path.parent.name)
+    mismatch = json.loads(path.read_text(encoding="utf-8"))["mismatch"]
+    rivals = [_stated(a) for a in mismatch["alternatives"] if a.get("log_likelihood_gap") is not None]
+    return Before(
+        tuple(stated for stated in map(_stated, mismatch["findings"]) if stated.numbers),
+        tuple(r for r in rivals if r.gap < DECIDED),
+        _known(result),
+        np.where(result.observed, np.sqrt(np.diag(result.estimate.covariance)), np.nan),
+    )
+
+
+def _stated(entry: Mapping[str, Any]) -> Stated:
+    """A finding or an alternative as ``result.json`` has it."""
+    from rig_identification.mismatch.findings import called
+    from rig_identification.plan import Stated
+
+    told = (entry.get("numbers") or {}).items()
+    numbers = {str(name): (float(value), float(std)) for name, (value, std) in told}
+    effect, gap = str(entry["effect"]), float(entry.get("log_likelihood_gap") or 0.0)
+    where, experiment = entry.get("where") or {}, str(entry.get("experiment") or "")
+    return Stated(called(effect, where), effect, numbers, where, gap, experiment)
+
+
+def _known(result: SessionResult) -> Known | None:
+    """What the recordings of a result tell of body and rig; None where nobody knows what its errors share."""
+    from rig_identification.plan import Known
+    from rig_identification.several.fuse import reduced
+    from rig_identification.several.ties import name_of, ties
+
+    if result.joint is None:
+        return None
+    part = reduced(result, ties([result]), 0)
+    return Known(tuple(name_of(key) for key in part.keys), part.information)
 
 
 def _unseen(stage: str, fraction: float | None = None) -> None:

@@ -35,20 +35,34 @@ class StageProgress:
             TextColumn("{task.description}"),
             BarColumn(bar_width=30),
             TimeElapsedColumn(),
+            TextColumn("{task.fields[beside]}"),
             console=Console(file=stream),
             transient=True,
             disable=not self.terminal,
         )
-        self._task = self._bar.add_task("", total=None)
+        self._task = self._bar.add_task("", total=None, beside="")
 
-    def __call__(self, stage: str, fraction: float | None = None) -> None:
-        """Report a stage and the fraction of it that is done, 0 to 1."""
+    def __call__(self, stage: str, fraction: float | None = None, beside: str = "") -> None:
+        """Report a stage, the fraction of it that is done, 0 to 1, and what else is to be said of it."""
         if self.terminal:
             total = None if fraction is None else 1.0
-            self._bar.update(self._task, description=stage, total=total, completed=fraction or 0.0)
-        elif stage != self._stage and self._clock() - self._start > QUIET_SECONDS:
-            print(stage, file=self._stream, flush=True)
+            self._bar.update(
+                self._task, description=stage, total=total, completed=fraction or 0.0, beside=beside
+            )
+        elif stage != self._stage:
+            self._line(f"{stage} ({beside})" if beside else stage)
         self._stage = stage
+
+    def say(self, text: str) -> None:
+        """Say something that stays: a line above the bar, or a line among the stages."""
+        if self.terminal:
+            self._bar.console.print(text, markup=False, highlight=False)
+        else:
+            self._line(text)
+
+    def _line(self, text: str) -> None:
+        if self._clock() - self._start > QUIET_SECONDS:
+            print(text, file=self._stream, flush=True)
 
     def __enter__(self) -> StageProgress:
         self._bar.start()

@@ -7,6 +7,7 @@ body about it moves every hinge by centimetres. So far origins are moved to the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,7 +101,11 @@ def told(found: Identification, origins: Origins) -> Identification:
         found,
         total=_body(found.total, origins),
         without_frame=None if without is None else _body(without, origins),
-        mismatch=replace(mismatch, findings=tuple(_finding(f, origins) for f in mismatch.findings)),
+        mismatch=replace(
+            mismatch,
+            findings=tuple(_finding(f, origins) for f in mismatch.findings),
+            alternatives=tuple(_alternative(a, origins) for a in mismatch.alternatives),
+        ),
         parameters=tuple(_parameter(p, origins) for p in found.parameters),
         figures=figures,
         joint=None if found.joint is None else _joint(found.joint, origins),
@@ -165,4 +170,15 @@ def _finding(finding: Finding, origins: Origins) -> Finding:
         value = entry.get("value")
         if isinstance(value, float):
             parameters[f"position_{axis}"] = {**entry, "value": value + float(origins.body[i])}
-    return replace(finding, where=where, parameters=parameters)
+    return replace(finding, where=where, parameters=parameters, numbers=_numbers(finding.numbers, origins))
+
+
+def _alternative(alternative: Mapping[str, object], origins: Origins) -> dict[str, object]:
+    numbers = alternative.get("numbers")
+    if not isinstance(numbers, Mapping):
+        return dict(alternative)
+    return {**alternative, "numbers": _numbers(numbers, origins)}
+
+
+def _numbers(numbers: Mapping[str, tuple[float, float]], origins: Origins) -> dict[str, tuple[float, float]]:
+    return {name: (value + _shift(name, origins), std) for name, (value, std) in numbers.items()}

@@ -37,6 +37,8 @@ def vehicle_quantities(alone: InertialEstimate, rig: Rig) -> tuple[Quantity, ...
         found += _with_std(alone, _turning(rig.vehicle))
     if rig.vehicle is not None and not lost & set(_CENTER):
         found += _with_std(alone, _center(rig.vehicle))
+        if "m" not in lost:
+            found += _with_std(alone, _loads(rig.vehicle, rig.gravity))
     return tuple(found)
 
 
@@ -96,6 +98,18 @@ def _center(wheels: WheelContacts) -> _Asked:
         behind = front - along
         rear_share = behind / wheelbase
         return np.array([height, behind, left, 1.0 - rear_share, rear_share, 0.5 + left / track])
+
+    return _Asked(names, of)
+
+
+def _loads(wheels: WheelContacts, gravity: float) -> _Asked:
+    """What each axle and each side carries on level ground. gravity: m/s^2."""
+    center = _center(wheels)
+    shares = [i for i, (name, _) in enumerate(center.names) if name.endswith("_share")]
+    names = tuple((center.names[i][0].replace("_share", "_load"), "N") for i in shares)
+
+    def of(elements: Array) -> Array:
+        return np.asarray(elements[0] * gravity * center.of(elements)[shares])
 
     return _Asked(names, of)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.estimates import Estimates, estimates
 from rig_identification.estimate.parameters import AXES
-from rig_identification.mismatch.candidate import Told
+from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.mismatch.experiments import experiment_for
 from rig_identification.mismatch.trial import Trial
 from rig_identification.quantity import plain_figure, with_interval
@@ -60,6 +60,7 @@ def finding(
         written(told),
         dict(evidence),
         f"{sentence} {candidate.advice}",
+        numbers=_numbers(candidate, found),
     )
 
 
@@ -86,13 +87,20 @@ def with_mended(mismatch: Mismatch, found: Sequence[Finding], so: str) -> Mismat
 
 def rival(trial: Trial, gap: float) -> dict[str, object]:
     """An entry of ``alternatives``: a hypothesis that trails what is told by ``gap`` nats."""
+    found = estimates(trial.problem, trial.evaluation)
     return {
         "effect": trial.candidate.effect,
         "where": dict(trial.candidate.where),
         "log_likelihood_gap": float(gap),
-        "parameters": written(trial.candidate.told(estimates(trial.problem, trial.evaluation))),
+        "parameters": written(trial.candidate.told(found)),
         "experiment": experiment_for(trial.candidate.kind),
+        "numbers": _numbers(trial.candidate, found),
     }
+
+
+def _numbers(candidate: Candidate, found: Estimates) -> dict[str, tuple[float, float]]:
+    """A hypothesis' parameters in the model, each with its std."""
+    return {q.name: found.of(q.name) for q in candidate.parameters if q.name in found.values}
 
 
 def written(told: Told) -> dict[str, dict[str, object]]:

@@ -66,7 +66,7 @@ def relative_std(lab: Laboratory, information: Array) -> Array:
 
 def determinable(lab: Laboratory, choices: Sequence[Choice]) -> tuple[str, ...]:
     """Elements that all of the menu together would determine."""
-    everything = lab.prior + np.sum([c.information for c in choices], axis=0)
+    everything = lab.before + np.sum([c.information for c in choices], axis=0)
     lost = lab.expected(np.asarray(everything)).unobservable
     return tuple(name for name in ELEMENTS if name not in lost)
 
@@ -94,16 +94,16 @@ def choose(
     choices: Sequence[Choice],
     seconds: float,
     most: float,
-    first: Choice | None,
+    first: Sequence[Choice],
     changeover: float = 0.0,
 ) -> Chosen:
     """The best use of ``seconds``. most: s that runs may take, beyond which a fit looks at no more of them.
 
-    first: what is recorded anyhow. changeover: s before each recording; another block of a run needs none. A
-    recording at rest is made once.
+    first: what is recorded anyhow, in its order. changeover: s before each recording; another block of a run
+    needs none. A recording at rest is made once.
     """
     determined = determinable(lab, choices)
-    information, spent, moving = lab.prior, 0.0, 0.0
+    information, spent, moving = lab.before, 0.0, 0.0
     steps: list[Step] = []
     taken: set[str] = set()
 
@@ -118,8 +118,8 @@ def choose(
         moving += choice.item.seconds if choice.item.run is not None else 0.0
         steps.append(Step(choice, spent, relative_std(lab, information)))
 
-    if first is not None:
-        take(first)
+    for choice in first:
+        take(choice)
     while True:
         open_ = [
             c

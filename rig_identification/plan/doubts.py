@@ -89,7 +89,7 @@ def doubts(lab: Laboratory, chosen: Sequence[tuple[Choice, int]], covariance: Ar
     found = informations(wide, items)
     if any(part is None for part in found):
         return None
-    total = wide.prior + np.sum(
+    total = wide.before + np.sum(
         [times * part for (_, times), part in zip(chosen, found, strict=True) if part is not None], axis=0
     )
     asked = _beyond(lab, wide, np.asarray(total), candidates)
@@ -113,7 +113,7 @@ def _wide(lab: Laboratory, items: Sequence[Item]) -> tuple[list[Candidate], Labo
     point = carried(wide, problem, Point(lab.theta, (), ()))
     probed = wide.bench.parameters.model.states - model.states
     bare = replace(wide, runs=(), rests=())
-    return [*candidates, *probes], Laboratory(lab.spec, bare, point.theta, probed)
+    return [*candidates, *probes], Laboratory(lab.spec, bare, point.theta, lab.shown, probed, lab.known)
 
 
 def _beyond(lab: Laboratory, wide: Laboratory, total: Array, candidates: list[Candidate]) -> list[_Beyond]:

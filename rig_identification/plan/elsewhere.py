@@ -78,11 +78,11 @@ def _with_device(
     run = next((c.item for c, _ in chosen if c.item.run is not None), None)
     if run is None:
         return None
-    richer = laboratory(spec, run)
+    richer = laboratory(spec, run, lab.known)
     told = _summed(richer, chosen)
     if told is None:
         return None
-    total = richer.prior + told
+    total = richer.before + told
     now = {n for n in ELEMENTS if n not in richer.expected(total).unobservable}
     more = tuple(n for n in ELEMENTS if n in now and n not in steps.determined)
     return Other(text, worst(relative_std(richer, total), steps.determined), more)
@@ -137,6 +137,6 @@ def _shared(lab: Laboratory, first: Array, second: Array) -> Array:
     for k, i in enumerate(own):
         moved[i, i], moved[i, p + k] = 0.0, 1.0
     total = moved.T @ second @ moved
-    total[:p, :p] += first + lab.prior
+    total[:p, :p] += first + lab.before
     total[p:, p:] += np.eye(extra)
     return integrated_out(total, p)

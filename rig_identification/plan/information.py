@@ -31,6 +31,7 @@ from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.model.motion import State, redundant
 from rig_identification.model.sensors import MocapMount
+from rig_identification.plan.before import Known
 from rig_identification.plan.menu import Item
 from rig_identification.recording import Recording, Session
 from rig_identification.result import InertialEstimate
@@ -53,7 +54,9 @@ class Laboratory:
     spec: SessionSpec  # without runs
     problem: Problem  # without runs and rests
     theta: Array
+    shown: Item  # a run in which every device that records is seen
     probed: int = 0  # states, the last of every run's, that stay where they are (mismatch/supports.py)
+    known: Known | None = None  # what an earlier session told
 
     @property
     def size(self) -> int:
@@ -68,6 +71,13 @@ class Laboratory:
             raise AssertionError("nothing is predicted")
         return there.information
 
+    @cached_property
+    def before(self) -> Array:
+        """(p, p) information that is there before anything is recorded: priors, and an earlier session's."""
+        if self.known is None:
+            return self.prior
+        return np.asarray(self.prior + self.known.on(self.problem.bench.parameters, self.theta))
+
     def expected(self, information: Array) -> InertialEstimate:
         """The ten numbers as an estimate with this information (p, p), priors included, would tell them."""
         return inertial_estimate(self.problem, self.evaluation(information))
@@ -78,8 +88,8 @@ class Laboratory:
         return Evaluation(point, (), (), 0.0, information, np.diag(self.prior).copy(), np.zeros(size))
 
 
-def laboratory(spec: SessionSpec, first: Item) -> Laboratory:
-    """The problem of a session of the rig and body of ``spec``. first: any run of it.
+def laboratory(spec: SessionSpec, first: Item, known: Known | None = None) -> Laboratory:
+    """The problem of a session of the rig and body of ``spec``. first: any run of it. known: from before.
 
     Raises InputError where the rig is held by more cables than the model can share a load among.
     """
@@ -93,7 +103,7 @@ def laboratory(spec: SessionSpec, first: Item) -> Laboratory:
     problem, _, _ = pose_problem(session)
     bench = replace(problem.bench, mocap=_tracker(spec) if spec.rates.mocap > 0.0 else None)
     problem = replace(problem, bench=bench, runs=(), rests=())
-    return Laboratory(spec, problem, problem.bench.parameters.start(spec.elements))
+    return Laboratory(spec, problem, problem.bench.parameters.start(spec.elements), first, known=known)
 
 
 def _tracker(spec: SessionSpec) -> MocapMount:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
 from rig_identification.estimate.enough import SECONDS
+from rig_identification.plan.apart import SURE, Tie, deciding, ties_of
+from rig_identification.plan.before import Before
 from rig_identification.plan.choose import Choice, Chosen, choose, relative_std, worst
 from rig_identification.plan.doubts import Doubts, doubts
 from rig_identification.plan.elsewhere import Other, others
@@ -38,6 +40,24 @@ class Planned:
 
 
 @dataclass(frozen=True)
+class Decision:
+    """What the plan makes of a tie that an earlier session left."""
+
+    told: str  # what that session told; "": nothing beyond the ideal model
+    rival: str
+    gap: float  # nats by which the rival trails so far
+    nats: float | None  # that the fitted recordings are expected to tell; None: cannot be predicted
+    chance: float | None  # of a decision
+    best: str  # the recording that tells most of it
+    experiment: str  # what would decide otherwise
+
+    @property
+    def decided(self) -> bool:
+        """Whether the plan is as good as sure to decide it."""
+        return self.chance is not None and self.chance >= SURE
+
+
+@dataclass(frozen=True)
 class Plan:
     """Everything that a plan says."""
 
@@ -52,6 +72,8 @@ class Plan:
     doubts: Doubts | None
     others: tuple[Other, ...]  # what else would help
     left_out: tuple[str, ...]  # of the menu: limits allow hardly any of it
+    decisions: tuple[Decision, ...] = ()  # on the ties of an earlier session
+    before: Array | None = None  # (10,) std of an earlier session's answer, which counts in what is expected
 
     @property
     def worst(self) -> float:
@@ -59,8 +81,17 @@ class Plan:
         return worst(self.relative, self.chosen.determined)
 
 
-def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) -> Plan:
+def plan(
+    rig: Rig,
+    elements: Array,
+    means: Means,
+    notify: Notify | None = None,
+    before: Before | None = None,
+) -> Plan:
     """The best use of the minutes that there are for a body (10,) on a rig.
+
+    before: an earlier session of that body on that rig. What decides its ties is recorded first, and what is
+    expected is what both sessions tell together.
 
     Raises
     ------
@@ -77,13 +108,16 @@ def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) 
         raise InputError(
             f"--travel {means.travel:g}: no run keeps hinges within it and cables taut; allow more room"
         )
-    lab = laboratory(spec, first)
+    earlier = before or Before()
+    lab = laboratory(spec, first, earlier.known)
     tell("what each run would tell", 0.15)
     choices = _told(lab, [item for item, _ in allowed.values()])
     fitted = 60.0 * means.minutes - means.block - means.changeover
     still = next((c for c in choices if c.item.name == bare(means).name), None)
-    tell("choosing runs", 0.55)
-    chosen = choose(lab, choices, fitted, SECONDS, still, means.changeover)
+    tell("choosing runs", 0.5)
+    ties = ties_of(lab, [choice.item for choice in choices], earlier) if earlier.rivals else ()
+    firsts = _firsts(choices, still, ties, fitted, means)
+    chosen = choose(lab, choices, fitted, SECONDS, firsts, means.changeover)
     recordings = _recordings(lab, chosen, choices, means)
     expected = lab.expected(chosen.information)
     tell("what the model may lack", 0.6)
@@ -104,7 +138,30 @@ def plan(rig: Rig, elements: Array, means: Means, notify: Notify | None = None) 
         found,
         others(lab, blocks, chosen),
         left_out,
+        tuple(_decision(tie, chosen) for tie in ties),
+        None if before is None else before.std,
     )
+
+
+def _firsts(
+    choices: Sequence[Choice], still: Choice | None, ties: Sequence[Tie], seconds: float, means: Means
+) -> list[Choice]:
+    """What is recorded anyhow: the body at rest, then what decides ties."""
+    first = [] if still is None else [still]
+    left = seconds - sum(choice.item.seconds + means.changeover for choice in first)
+    open_ = [c.item for c in choices if c is not still]
+    times = deciding(ties, open_, left, SECONDS, means.changeover)
+    by_name = {choice.item.name: choice for choice in choices}
+    return first + [by_name[name] for name, n in times.items() for _ in range(n)]
+
+
+def _decision(tie: Tie, chosen: Chosen) -> Decision:
+    blocks = chosen.blocks()
+    if not tie.sides:
+        return Decision(tie.told, tie.rival, tie.gap, None, None, "", tie.experiment)
+    nats = tie.nats(blocks)
+    best = max(blocks, key=lambda name: tie.nats({name: blocks[name]}))
+    return Decision(tie.told, tie.rival, tie.gap, nats, tie.chance(nats), best, tie.experiment)
 
 
 def session_of(found: Plan) -> SessionSpec:
@@ -212,7 +269,7 @@ def _usual_worst(lab: Laboratory, chosen: Chosen, means: Means) -> float | None:
         return None
     rest = sum(item.seconds for item in items if item.run is None) + len(items) * means.changeover
     blocks = max(1.0, min(SECONDS, chosen.steps[-1].seconds - rest) / means.block)
-    total = lab.prior
+    total = lab.before
     for item, part in zip(items, told, strict=True):
         if part is not None:
             total = total + (1.0 if item.run is None else blocks / len(runs)) * part

@@ -45,8 +45,19 @@ def plan_document(plan: Plan) -> dict[str, object]:
         "bias_at_half_detection_limit": [] if found is None else [asdict(bias) for bias in found.biases],
         "what_else": [asdict(other) for other in plan.others],
         "left_out_of_the_menu": list(plan.left_out),
+        **_after(plan),
     }
     return {key: plain(value) for key, value in document.items()}
+
+
+def _after(plan: Plan) -> dict[str, object]:
+    """What an earlier session adds to a plan; nothing without one."""
+    if plan.before is None:
+        return {}
+    return {
+        "earlier_std": dict(zip(ELEMENTS, plan.before, strict=True)),
+        "ties": [{**asdict(d), "decided": d.decided} for d in plan.decisions],
+    }
 
 
 def _recording(planned: Planned) -> dict[str, object]:

@@ -15,6 +15,7 @@ from rig_identification.quantity import NOT_DETERMINED, significant, unit_text
 from rig_identification.report.line_chart import Curve, Panel, chart_svg
 from rig_identification.report.page import page_environment
 from rig_identification.report.ten_numbers import UNITS
+from rig_identification.report.words import words
 from rig_identification.result import ELEMENTS
 
 #: px of a small chart; biases that are listed at most.
@@ -30,10 +31,12 @@ def render_plan(plan: Plan) -> str:
         plan=plan,
         summary=summary(plan),
         recordings=_recordings(plan),
+        heads=expected_heads(plan),
         expected=expected_rows(plan),
         charts=[_chart(plan, i) for i in range(len(ELEMENTS))],
         biases=_biases(plan),
         undecided=() if plan.doubts is None else plan.doubts.undecided,
+        ties=tie_rows(plan),
         others=[(o.text, _percent(o.worst), ", ".join(o.determined)) for o in plan.others],
     )
 
@@ -50,7 +53,24 @@ def summary(plan: Plan) -> str:
     )
     if plan.usual_worst is not None:
         text += f" A release shaken at one speed for as long would leave {_percent(plan.usual_worst)}."
+    if plan.before is not None:
+        text += " It holds for both sessions together."
     return text
+
+
+def tie_rows(plan: Plan) -> list[tuple[str, ...]]:
+    """Tie, what decides it, how far apart so far, expected σ apart after the plan, chance; as text."""
+    rows: list[tuple[str, ...]] = []
+    for d in plan.decisions:
+        tie = f"{words(d.told)} or {words(d.rival)}" if d.told else f"whether there is {words(d.rival)}"
+        so_far = f"{significant(np.sqrt(2.0 * d.gap), 2)} σ"
+        if d.nats is None or d.chance is None:
+            rows.append((tie, d.experiment, so_far, "not known", ""))
+            continue
+        by = d.best if d.decided else f"not by these runs: {d.experiment}" if d.experiment else "not by these"
+        expected = significant(np.sqrt(2.0 * d.nats), 2)
+        rows.append((tie, by, so_far, f"{expected} σ", f"{100.0 * d.chance:.0f} %"))
+    return rows
 
 
 def _percent(share: float) -> str:
@@ -58,18 +78,32 @@ def _percent(share: float) -> str:
 
 
 def expected_rows(plan: Plan) -> list[tuple[str, ...]]:
-    """Element, guessed value, expected std, the same if nothing is left out, unit, share; as text."""
+    """Element, guessed value, expected std, the same if nothing is left out, unit, share; as text.
+
+    After an earlier session its std stands before the expected one.
+    """
     rows: list[tuple[str, ...]] = []
     for i, (name, unit) in enumerate(zip(ELEMENTS, UNITS, strict=True)):
         value = significant(plan.expected.values[i], 4)
         if name in plan.expected.unobservable:
-            rows.append((name, value, NOT_DETERMINED, "", unit, ""))
+            rows.append((name, value, *_so_far(plan, i), NOT_DETERMINED, "", unit, ""))
             continue
         std, alone = np.sqrt([plan.expected.covariance[i, i], plan.alone[i, i]])
-        rows.append(
-            (name, value, significant(std, 2), significant(alone, 2), unit, _percent(plan.relative[i]))
-        )
+        told = (significant(std, 2), significant(alone, 2), unit, _percent(plan.relative[i]))
+        rows.append((name, value, *_so_far(plan, i), *told))
     return rows
+
+
+def expected_heads(plan: Plan) -> tuple[str, ...]:
+    """Heads of :func:`expected_rows`."""
+    begin = ("element", "guessed") if plan.before is None else ("element", "so far", "σ so far")
+    return (*begin, "σ", "σ if nothing is left out", "unit", "share")
+
+
+def _so_far(plan: Plan, i: int) -> tuple[str, ...]:
+    if plan.before is None:
+        return ()
+    return (significant(plan.before[i], 2) if np.isfinite(plan.before[i]) else NOT_DETERMINED,)
 
 
 def _recordings(plan: Plan) -> list[tuple[str, ...]]:

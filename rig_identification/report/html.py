@@ -16,6 +16,7 @@ from rig_identification.report.findings import alternative_views, finding_views,
 from rig_identification.report.grades import grade
 from rig_identification.report.identity import digest, recorded_on
 from rig_identification.report.lights import lights
+from rig_identification.report.narrower import narrower
 from rig_identification.report.page import page_environment, script, vendored
 from rig_identification.report.replay import replay_json
 from rig_identification.report.residual_views import rms_table, whiteness_views
@@ -26,6 +27,7 @@ from rig_identification.report.setup import faulty_parts, setup_view
 from rig_identification.report.ten_numbers import blocks
 from rig_identification.report.textbook import textbook_views
 from rig_identification.report.to_copy import to_copy
+from rig_identification.report.vehicle import vehicle_view
 from rig_identification.result import Identification
 
 #: How the topic of a simulation's truth ends (recording contract).
@@ -87,8 +89,10 @@ def _chapters(identification: Identification, session: Session) -> dict[str, obj
         "marked": ", ".join(sorted(scene.marked | {name for name, _ in scene.spots})),
         "lights": lights(identification),
         "steps": next_steps(identification, session),
+        "narrower": narrower(identification),
         "grade": grade,
         "textbook": textbook_views(identification),
+        "vehicle": vehicle_view(identification, wheels=session.rig.vehicle is not None),
         "blocks": ten,
         "principal": any(block.principal for block in ten),
         "truths": {q.topic for r in session.recordings for q in r.quality if q.topic.endswith(TRUTH)},

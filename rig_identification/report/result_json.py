@@ -184,6 +184,7 @@ def _finding(finding: Finding) -> dict[str, object]:
         "evidence": plain(finding.evidence),
         "statement": finding.statement,
         **{key: text for key, text in beside.items() if text},
+        **({"numbers": plain(finding.numbers)} if finding.numbers else {}),
     }
 
 

@@ -250,4 +250,6 @@ def _alone_or_with_one_more(
             )
             if both.wholly:
                 return both
-    return undecided_beside(best, promises, count_of(left), lambda stage, _: say(stage), named.budget)
+    return undecided_beside(
+        best, promises, count_of(left), lambda stage, _: say(stage.removeprefix("search: ")), named.budget
+    )

@@ -109,6 +109,12 @@ def _key(doubt: Doubt, rig: str, joint: JointInformation | None, said: Sharing) 
     return ("" if anywhere else rig, doubt.name, stated, place)
 
 
+def name_of(key: Hashable) -> str:
+    """Name of the doubt that a key of :class:`Ties` stands for."""
+    assert isinstance(key, tuple)
+    return str(key[1])
+
+
 def _kind(name: str) -> str:
     """``ceiling_point`` of ``cable_1.ceiling_point.x``, ``length`` of ``cable_1.length``."""
     parts = name.split(".")

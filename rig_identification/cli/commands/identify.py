@@ -123,6 +123,7 @@ def answered(
         The user broke the search off when there was an answer already; it is in ``result``.
     """
     from rig_identification.api import Stopped, identify
+    from rig_identification.cli.searching import Searching
     from rig_identification.identification import prepare
     from rig_identification.session.provenance import file_digests
 
@@ -130,7 +131,9 @@ def answered(
     digests = file_digests(path, watched(progress))
     prepared = prepare(recorded.raw, watched(progress))
     try:
-        return replace(identify(prepared, progress=progress, work=work), digests=digests)
+        searching = Searching(progress, work)
+        found = identify(prepared, progress=searching, work=work, watcher=searching.better)
+        return replace(found, digests=digests)
     except Stopped as stopped:
         raise Stopped(replace(stopped.result, digests=digests)) from stopped
 

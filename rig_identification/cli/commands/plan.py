@@ -81,13 +81,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Plan, write, and print what to record."""
-    from rig_identification.api.planning import plan_session
+    from rig_identification.api.planning import earlier, plan_session
     from rig_identification.session import read_rig
 
     check_output_folder(arguments.out, FILES)
     body, means = body_of(arguments, read_rig(arguments.rig)), means_given(arguments)
     with StageProgress(sys.stderr) as progress:
-        found = plan_session(arguments.rig, body, means, progress=progress)
+        before = None if arguments.after is None else earlier(arguments.after)
+        found = plan_session(arguments.rig, body, means, progress=progress, before=before)
         progress("writing the plan")
         written(found, arguments.out)
     _print(found.plan, arguments.out)
@@ -118,14 +119,17 @@ def _print(found: Plan, out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from rig_identification.plan_report.page import expected_rows, summary
+    from rig_identification.plan_report.page import expected_heads, expected_rows, summary, tie_rows
     from rig_identification.plan_report.programme import instruction
 
-    table = Table("element", "guessed", "σ", "σ if nothing is left out", "unit", "share", box=None)
+    table = Table(*expected_heads(found), box=None)
     for row in expected_rows(found):
         table.add_row(*row)
     Console().print(table)
     print(summary(found))
+    for tie, by, so_far, expected, chance in tie_rows(found):
+        sure = f", decides with a chance of {chance}" if chance else ""
+        print(f"{tie}: {so_far} apart so far, {expected} expected{sure}: {by}")
     for planned in found.recordings:
         item = planned.item
         print(f"{item.name}: {item.seconds:g} s {planned.role}: {instruction(found, item.name)}")

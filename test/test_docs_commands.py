@@ -1,0 +1,199 @@
+"""Commands of README and docs: the parser takes every one, and those that need no rig or network are run.
+
+A block stands in one of three lists. ``CASES`` are run as they stand, in a folder that holds what the page
+takes for given. ``ELSEWHERE`` are run by another test. What begins with a command of ``OUTSIDE`` needs
+what is not here.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from test_docs_pages import DOCS, README, ROOT, blocks
+from test_several_commands import sessions, write
+
+import rig_identification as ri
+from rig_identification.cli.main import build_parser
+
+COMMAND = "rig-identification"
+PAGES = [README, *sorted(DOCS.rglob("*.md"))]
+SHELL = re.compile(r"^ *```(?:sh|bash|console|)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
+#: Commands that need a running graph, a network, a cluster or a browser.
+OUTSIDE = ("python3", "pip", "ros2", "colcon", "sbatch", "interfaces/build.sh")
+#: ``rig`` and ``ui`` run until they are stopped.
+ENDLESS = ("rig", "ui")
+#: Blocks that are run by another test, by page.
+ELSEWHERE = {
+    "docs/how-to/import.md": "test_newcomer.py",
+    "docs/how-to/own-effect.md": "test_own_effect.py",
+    "docs/thesis.md": "test_thesis_rerun.py",
+}
+
+
+def name_of(page: Path) -> str:
+    """A page as it is named here."""
+    return page.relative_to(ROOT).as_posix()
+
+
+def commands(block: str) -> list[str]:
+    """The lines of a block that are commands, each whole; none where it shows what a command prints."""
+    joined = re.sub(r"\\\n\s*", "", block)
+    lines = [re.sub(r"\s+#.*$", "", line).removeprefix("$ ").strip() for line in joined.splitlines()]
+    return [line for line in lines if line.removeprefix(".venv/bin/").split(" ")[0] in (COMMAND, *OUTSIDE)]
+
+
+def shell_blocks(page: Path) -> list[list[str]]:
+    """The commands of each block of a page."""
+    return [told for block in SHELL.findall(page.read_text(encoding="utf-8")) if (told := commands(block))]
+
+
+ALL = [(page, i, told) for page in PAGES for i, told in enumerate(shell_blocks(page))]
+OURS = [
+    (name_of(page), line.partition(COMMAND)[2])
+    for page, _, told in ALL
+    for line in told
+    if COMMAND in line.split(" ")[0]
+]
+
+
+@pytest.mark.parametrize(("page", "line"), OURS, ids=lambda value: str(value)[:60])
+def test_the_parser_takes_every_command(page: str, line: str) -> None:
+    """Its options exist and what it needs is given."""
+    words = shlex.split(line.partition(">")[0].replace("[", "").replace("...]", ""))
+    asked = build_parser().parse_args(words)
+    assert callable(asked.run)
+
+
+# --- what is run -----------------------------------------------------------------------------------------
+
+
+def results(*names: str) -> Callable[[Path], None]:
+    """Folders with results of one body on one rig."""
+
+    def given(folder: Path) -> None:
+        for name, result in zip(names, sessions(len(names)), strict=True):
+            write(result, folder / name)
+
+    return given
+
+
+def simulated(*names: str) -> Callable[[Path], None]:
+    """Sessions of eight seconds on the thesis' first rig."""
+
+    def given(folder: Path) -> None:
+        for k, name in enumerate(names):
+            ri.simulate(case="1", start="pulled", duration=8.0, rest=4.0, seed=k).write(folder / name)
+
+    return given
+
+
+def nothing(folder: Path) -> None:
+    """An empty folder."""
+
+
+def described(folder: Path) -> None:
+    """The description of a car on four cables."""
+    shutil.copy(ROOT / "config" / "car_four_cables.yaml", folder / "rig.yaml")
+
+
+def own_rig(folder: Path) -> None:
+    """The page's own description, and a session of a rig that is there already."""
+    (folder / "rig.yaml").write_text(blocks(DOCS / "how-to" / "own-rig.md", "yaml")[0], encoding="utf-8")
+    simulated("SESSION")(folder)
+
+
+def remembered(folder: Path) -> None:
+    """Results of sessions on a rig, and one that is recorded today."""
+    simulated("today", "monday")(folder)
+    run("rig-identification identify monday --out results/monday", folder)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Blocks of a page that are run one after the other in one folder."""
+
+    page: str
+    blocks: tuple[int, ...]
+    given: Callable[[Path], None]
+    makes: tuple[str, ...]  # files that are there in the end
+    long: bool = True
+
+
+CASES = (
+    Case(
+        "docs/how-to/compare.md", (0,), results("monday", "friday"), ("agreement/compare.html",), long=False
+    ),
+    Case(
+        "docs/how-to/rig-memory.md",
+        (0,),
+        results("results/a", "results/b", "results/c"),
+        ("rig/memory.json",),
+        long=False,
+    ),
+    Case("docs/how-to/rig-memory.md", (1,), remembered, ("today_with_memory/result.json",)),
+    Case("docs/how-to/fuse.md", (0,), simulated("high", "low"), ("both/result.json",)),
+    Case("docs/how-to/certificate.md", (0,), simulated("SESSION"), ("certified/certificate.pdf",)),
+    Case("docs/how-to/own-rig.md", (0, 1), own_rig, ("trial_answer/report.html", "ANSWER/report.html")),
+    Case("docs/how-to/batch.md", (0,), simulated("sessions/a", "sessions/b"), ("results/a/result.json",)),
+    Case("docs/how-to/plan.md", (0,), described, ("plan/plan.html", "plan/session.yaml")),
+    Case("docs/how-to/plan.md", (1,), lambda folder: after_a_session(folder), ("plan/plan.html",)),
+)
+
+
+def after_a_session(folder: Path) -> None:
+    """A session's answer, and its rig."""
+    simulated("session")(folder)
+    run("rig-identification identify session --out answer", folder)
+    shutil.copy(folder / "session" / "rig.yaml", folder / "rig.yaml")
+
+
+def run(line: str, folder: Path) -> None:
+    """Run a command as a shell does, with this interpreter's installation."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    script = f"set -euo pipefail; {line}"
+    done = subprocess.run(
+        ["bash", "-c", script],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=900,
+    )
+    assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, id=f"{c.page}-{c.blocks}", marks=[pytest.mark.long] if c.long else []) for c in CASES],
+)
+def test_the_commands_of_a_page_do_what_it_says(case: Case, tmp_path: Path) -> None:
+    case.given(tmp_path)
+    told = shell_blocks(ROOT / case.page)
+    for i in case.blocks:
+        for line in told[i]:
+            run(line, tmp_path)
+    assert [name for name in case.makes if not (tmp_path / name).is_file()] == []
+
+
+def test_every_block_is_run_or_cannot_be() -> None:
+    """A new block has to be put into one of the lists."""
+    listed = {(case.page, i) for case in CASES for i in case.blocks}
+    left = []
+    for page, i, told in ALL:
+        first = told[0].removeprefix(".venv/bin/").split(" ")
+        outside = any(line.split(" ")[0] in OUTSIDE for line in told)
+        endless = first[0] == COMMAND and first[1] in ENDLESS
+        if not (outside or endless or (name_of(page), i) in listed or name_of(page) in ELSEWHERE):
+            left.append((name_of(page), told))
+    assert left == []
+    assert all((ROOT / "test" / name).is_file() for name in ELSEWHERE.values())
