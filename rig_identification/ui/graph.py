@@ -5,6 +5,7 @@ The program runs while somebody looks, and some seconds longer. Without ROS it s
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -41,7 +42,8 @@ class Graph:
         self._answers: dict[str, dict[str, Any]] = {}
         self._process = _process(namespace)
         self.looked = time.monotonic()
-        threading.Thread(target=self._follow, daemon=True).start()
+        self._follower = threading.Thread(target=self._follow, daemon=True)
+        self._follower.start()
 
     @property
     def running(self) -> bool:
@@ -63,7 +65,7 @@ class Graph:
         try:
             stream.write(json.dumps({"id": name, **request}) + "\n")
             stream.flush()
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise InputError(
                 "the program that listens to the graph has ended; open the page again"
             ) from error
@@ -76,6 +78,7 @@ class Graph:
         """End the program."""
         if self.running:
             self._process.kill()
+        self._follower.join(5.0)
 
     def _follow(self) -> None:
         assert self._process.stdout is not None
@@ -92,9 +95,16 @@ class Graph:
                     self._keep(kind, line.strip())
                 self._lock.notify_all()
         code = self._process.wait()
+        self._process.stdout.close()
         with self._lock:
+            self._close_input()
             if "missing" not in self._kept:
                 self._keep("ended", json.dumps({"kind": "ended", "message": f"it ended with {code}"}))
+
+    def _close_input(self) -> None:
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # what waits to be written goes nowhere
+            self._process.stdin.close()
 
     def _keep(self, kind: str, line: str) -> None:
         self._count += 1
