@@ -66,6 +66,11 @@ def test_a_cell_that_reads_high_is_told_before_the_run_is_over() -> None:
     value, std = (float(str(found.finding.parameters["gain"][key])) for key in ("value", "std"))
     assert abs(value - GAIN) < 4.0 * std < 0.5 * GAIN
     assert "cable_2" in found.text
+    # The body is told with the gain in the model: without it, it bends to it
+    assert found.estimate is not None
+    true = shaken(10, SECONDS).elements
+    off = (found.estimate.values - true) / np.sqrt(np.diag(found.estimate.covariance))
+    assert np.max(np.abs(off)) < 4.0
     assert 5.0 + took < SECONDS  # s of this process: another one's work is no part of it
 
 
@@ -77,6 +82,7 @@ def test_nothing_is_told_of_a_rig_without_fault_and_the_end_is_foreseen() -> Non
     assert early.error == pytest.approx(1.0, abs=0.05)
     foreseen = forecast(early.fitted, "run_1", 10.0)
     assert foreseen is not None
+    assert early.estimate is not None
     now = np.sqrt(np.diag(early.estimate.covariance))
     assert foreseen.std[0] == pytest.approx(now, rel=0.02)  # but for the force that is smoothed anew
     whole = fit_session(session)

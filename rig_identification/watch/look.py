@@ -43,7 +43,7 @@ class Look:
     verdict: str  # "none", "explained": the finding leaves noise; "unexplained"
     finding: Finding | None  # what explains the motion best; None: nothing does, or nothing has to
     cause: str  # label of its hypothesis; "" without a finding
-    estimate: InertialEstimate  # of the ideal model
+    estimate: InertialEstimate | None  # with the finding in the model; None where that does not explain it
     fitted: Fitted
 
     @property
@@ -85,9 +85,10 @@ def look(session: Session, before: Look | None = None) -> Look:
     ideal = Ideal(fitted, *judged(fitted))
     evaluation = fitted.evaluation
     seconds = sum(run.grid.duration for run in fitted.problem.runs)
+    sound = ideal.mismatch.verdict == "none"
     plain = Look(
         seconds, float(np.sqrt(misfit(evaluation))), ideal.mismatch.verdict, None, "",
-        inertial_estimate(fitted.problem, evaluation), fitted,
+        inertial_estimate(fitted.problem, evaluation) if sound else None, fitted,
     )  # fmt: skip
     if not fitted.problem.runs or only_watched(fitted.problem):
         # A body that is only watched to swing is damped by what no first order tells
@@ -97,11 +98,10 @@ def look(session: Session, before: Look | None = None) -> Look:
     if best is None:
         return plain
     told = finding(best, estimates(best.problem, best.evaluation), _evidence(ideal, best))
-    left = misfit(best.evaluation)
-    return replace(
-        plain, verdict="explained" if left < NEAR_SQUARE else "unexplained",
-        finding=told, cause=best.candidate.label,
-    )  # fmt: skip
+    plain = replace(plain, finding=told, cause=best.candidate.label)
+    if misfit(best.evaluation) >= NEAR_SQUARE:
+        return replace(plain, verdict="unexplained", estimate=None)
+    return replace(plain, verdict="explained", estimate=inertial_estimate(best.problem, best.evaluation))
 
 
 def _best(problem: Problem, ideal: Ideal, known: str) -> Trial | None:

@@ -134,7 +134,6 @@
   // What a look said
   const CHIPS = {none: ["good", "sound so far"], explained: ["bad", "found"], unexplained: ["bad", "not explained"]};
   const body = part => {
-    const entry = (key, name) => { const p = part?.[key]; return p ? p[name] ?? p : null; };
     const out = [];
     const value = (held, k) => held && held.value !== undefined ? [k === undefined ? held.value : held.value?.[k] ?? null, k === undefined ? held.std : held.std?.[k] ?? null] : [null, null];
     out.push(value(part.mass), ...[0, 1, 2].map(k => value(part.center_of_mass, k)));
@@ -150,7 +149,9 @@
     text(card.querySelector(".of"), said.recording ? `${said.recording}, after ${said.seconds.toFixed(0)} s of it; the look took ${said.took.toFixed(0)} s` : "");
     text(card.querySelector(".text"), said.text);
     card.querySelector(".faults").replaceChildren(...(said.faults ?? []).filter(f => f !== said.text).map(f => make("li", f)));
-    if (said.body) { fitOf.length = 0; fitOf.push(...body(said.body)); fillTable(); }
+    fitOf.length = 0;
+    if (said.body) fitOf.push(...body(said.body));
+    fillTable();
     const f = said.forecast;
     if (!f) return;
     const end = f.seconds[f.seconds.length - 1], percent = x => `${(100 * x).toPrecision(2)} %`;
