@@ -47,8 +47,8 @@ class Graph:
 
     @property
     def running(self) -> bool:
-        """Whether the program does."""
-        return self._process.poll() is None
+        """Whether the program does, or something that it said is still to be taken in."""
+        return self._follower.is_alive()
 
     def since(self, count: int) -> tuple[int, list[str]]:
         """Lines of JSON that came after the first ``count``, and how many there are by now."""
