@@ -55,7 +55,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        shared("config", "*.yaml"),
+        shared("config", "*.yaml", "*.json", "*.rviz"),
         shared("launch", "*.launch.py"),
     ],
     zip_safe=False,

@@ -57,13 +57,15 @@ ALLOWED = {
     "plan_report": CORE | {"plan", "simulate", "report"},
     "report": CORE | {"several"},
     "live": {"model", "statics", "estimate"},
+    "watch": {"model", "estimate", "mismatch"},
     "identification": {"check", "cleaning", "search", "session"},
+    "watching": {"identification", "live", "watch"},
     "": {"api"},
     "api": CORE
     | {"check", "identification", "report", "session", "simulate", "thesis"}
     | {"plan", "plan_report", "several"},
     "ui": {"api", "report", "statics", "model", "plan_report", "session"},
-    "nodes": CORE | {"cleaning", "session", "report", "identification"},
+    "nodes": CORE | {"cleaning", "session", "report", "identification", "watching"},
 }
 OUTSIDE_THE_CORE = {
     "argparse",
@@ -127,14 +129,14 @@ def test_a_room_imports_only_rooms_before_it(path: Path) -> None:
 @pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_core_knows_no_files_no_ros_no_terminal(path: Path) -> None:
     outside = {name.split(".")[0] for name in imported(path)}
-    if room(path) in CORE | VALUES | {"check", "cleaning", "several", "simulate", "plan"}:
+    if room(path) in CORE | VALUES | {"check", "cleaning", "several", "simulate", "plan", "watch"}:
         assert not outside & OUTSIDE_THE_CORE
     if room(path) != "nodes":
         assert not {name for name in outside if ROS.fullmatch(name)}
 
 
 #: Rooms whose answers may not depend on when they are asked, or on how fast the machine is.
-TIMELESS = {"model", "statics", "estimate", "mismatch", "search", "several"}
+TIMELESS = {"model", "statics", "estimate", "mismatch", "search", "several", "watch"}
 CLOCK_MODULES = {"time", "timeit", "datetime", "sched", "resource", "signal"}
 CLOCKS = re.compile(
     r"(monotonic|perf_counter|process_time|thread_time|clock_gettime|time)(_ns)?|now|utcnow|today|getrusage"

@@ -105,6 +105,7 @@ def test_a_center_of_mass_is_solved(width: int, client: Client) -> None:
         angle.locator(".fault").wait_for(state="hidden")
 
 
+@pytest.mark.long  # test_page_tasks.py asks the same without a browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_session_is_simulated_checked_identified_and_has_a_history(width: int, client: Client) -> None:
     name = f"car_{width}"
@@ -132,13 +133,14 @@ def test_a_session_is_simulated_checked_identified_and_has_a_history(width: int,
         page.locator("#job progress").wait_for()
         page.locator("#job .stages li").first.wait_for(timeout=LONG)
         report = page.frame_locator("iframe")
-        report.get_by_text("The ten numbers").wait_for(timeout=LONG)
+        report.get_by_role("heading", name="The ten numbers").wait_for(timeout=LONG)
         page.get_by_role("link", name="History").click()
         assert f"answers/simulated/{name}" in page.locator("table").inner_text()
         if width != WIDTHS[0]:  # two sessions by now
             page.frame_locator("iframe").get_by_text("Session by session").wait_for()
 
 
+@pytest.mark.long  # test_page_tasks.py asks the same without a browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_fit_is_stopped(width: int, client: Client) -> None:
     """After the test above, whose session is there."""
@@ -150,11 +152,13 @@ def test_a_fit_is_stopped(width: int, client: Client) -> None:
         page.get_by_role("button", name="Identify").click()
         page.locator("#job .stages li").first.wait_for(timeout=LONG)
         page.get_by_role("button", name="Stop").click()
-        page.locator(".stopping").wait_for()
-        page.get_by_role("button", name="Stop").click()
-        page.get_by_text("Back to the form").wait_for(timeout=LONG)
+        # A fit that is told to stop may have its answer within the second, and its page then shows that
+        page.locator("#job").wait_for(state="detached", timeout=LONG)
+        told = page.locator("body").inner_text()
+        assert "the best answer until then" in told or "Back to the form" in told
 
 
+@pytest.mark.long  # test_page_tasks.py asks the same without a browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_session_is_planned(width: int, client: Client) -> None:
     with page_of(client, width) as page:

@@ -18,10 +18,10 @@ from rig_identification.ui.guard import LARGEST_BODY
 
 HOSTILE = '<img src=x onerror="alert(1)">'
 #: Every page and what a program may ask.
-PAGES = ("/", "/rig", "/check", "/plan", "/simulate", "/balance", "/identify", "/history")
+PAGES = ("/", "/rig", "/check", "/plan", "/simulate", "/balance", "/identify", "/live", "/history")
 POSTS = (
     "/rig/drawing", "/rig/save", "/check/start", "/identify/start", "/plan/start", "/simulate/start",
-    "/balance/solve", "/jobs/none/stop",
+    "/balance/solve", "/live/window", "/jobs/none/stop",
 )  # fmt: skip
 #: Names that lead out of a folder, each in its own way.
 OUTWARD = (
@@ -49,7 +49,9 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
         yield found
 
 
-@pytest.mark.parametrize("path", [*PAGES, "/static/ui.js", "/files/report.html", "/jobs/none/state"])
+@pytest.mark.parametrize(
+    "path", [*PAGES, "/static/ui.js", "/files/report.html", "/jobs/none/state", "/live/events"]
+)
 def test_nothing_is_shown_without_the_token(client: Client, path: str) -> None:
     for cookie in ({}, {"Cookie": f"rig_identification_{client.port}=wrong"}, {"Cookie": f"other={TOKEN}"}):
         assert client.ask(path, known=False, **cookie).status == 403

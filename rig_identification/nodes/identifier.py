@@ -28,6 +28,7 @@ from rig_identification.nodes.running import RunningEstimator
 from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
 from rig_identification.nodes.stream_diagnostics import stream_status
 from rig_identification.nodes.typed import typed_interface
+from rig_identification.nodes.watcher import Watcher
 from rig_identification.topics import expected_topics
 
 PARAMETERS = (
@@ -40,6 +41,18 @@ PARAMETERS = (
     OwnParameter("period", 0.05, "s between looks at what arrived", within(0.005, 1.0, "s")),
     OwnParameter("depth", 2000, "messages kept of each topic: seconds of the fastest", within(10, 100_000)),
     OwnParameter("running_rate", 0.5, "Hz of the running estimate; 0: none", within(0.0, 10.0, "Hz")),
+    OwnParameter(
+        "watch_period",
+        5.0,
+        "s between looks at the open window, and as long as one takes; 0: none",
+        within(0.0, 600.0, "s"),
+    ),
+    OwnParameter(
+        "planned_seconds", 60.0, "s that a run is to last, for the forecast", within(5.0, 3600.0, "s")
+    ),
+    OwnParameter(
+        "aim", 0.01, "95 % half-width of J as a share of its size that is enough", within(1e-6, 1.0)
+    ),
     *RECORDING,
 )
 #: Parts of a result that each request is answered with.
@@ -87,6 +100,10 @@ class IdentifierNode(RigNode):
         self.windows = SessionFolder(folder, self._description, topics, self.own.text("storage"))
         self.intake = Intake(self, topics, self.own.whole("depth"), watch_range=True)
         self.running = RunningEstimator(self, self._description, self.own.number("running_rate"))
+        self.watcher = Watcher(
+            self, self._description, self.own.number("watch_period"), self.own.number("planned_seconds"),
+            self.own.number("aim"),
+        )  # fmt: skip
         self.fits = Fits(lambda: self.get_clock().now().nanoseconds / 1e9, self._tell, self._publish)
         self.keeper = BagKeeper(self, self.windows, self.intake)
         self._offer()
@@ -121,6 +138,7 @@ class IdentifierNode(RigNode):
         """Open a window; returns what to tell. Raises InputError."""
         self.keeper.start(plan)
         self.running.listen(plan.kind == "dynamic")
+        self.watcher.start(plan)
         return f"window {plan.name} ({plan.kind}) is open"
 
     def _stop_window(self) -> Later:
@@ -138,6 +156,7 @@ class IdentifierNode(RigNode):
         if self.keeper.ending:
             raise InputError(f"window {plan.name} waits for its last messages already")
         self.running.listen(False)
+        self.watcher.stop()
 
         def told(counts: dict[str, int]) -> str:
             missing = [name for name in self._expected() if not counts.get(name)]
@@ -161,6 +180,7 @@ class IdentifierNode(RigNode):
         count, self.windows.done[:] = len(self.windows.done), []
         (self.windows.folder / "session.yaml").unlink(missing_ok=True)
         self.running.forget()
+        self.watcher.forget()
         self.fits.forget_job()
         return f"{count} windows are gone"
 
@@ -201,8 +221,10 @@ class IdentifierNode(RigNode):
     def _work(self) -> None:
         for batch in self.intake.take():
             self.running.add(batch)
+            self.watcher.add(batch)
             self.keeper.write(batch)
         self.keeper.look()
+        self.watcher.look()
         self.fits.look()
         self.typed.look()
 
@@ -231,11 +253,13 @@ class IdentifierNode(RigNode):
             messages=sum(self.windows.counts.values()), done=[done.name for done in self.windows.done],
         )  # fmt: skip
         interface = diagnostic(f"{self.get_name()}: interface", OK, self.typed.told)
-        return [*super().status(), line, interface, *stream_status(self, self.intake)]
+        watched = diagnostic(f"{self.get_name()}: watch", OK, self.watcher.said)
+        return [*super().status(), line, watched, interface, *stream_status(self, self.intake)]
 
     def close(self) -> None:
         """End the fit, finish the window, and leave no temporary folder."""
         self.fits.close()
+        self.watcher.close()
         self.typed.close()
         if not self._temporary:
             self._work()

@@ -42,6 +42,8 @@ class Batch:
     sent_ns: Stamps  # (n,) this machine's clock
     stamp_ns: Stamps  # (k,) of the believable samples
     values: Array  # (k, w) finite where the sensor measured
+    heard_ns: Stamps  # (n,) stamps of all, believable or not; none where a message does not deserialize
+    heard: Array  # (n, w) their numbers
 
     def __len__(self) -> int:
         return len(self.messages)
@@ -111,7 +113,8 @@ class Intake:
         except InputError:
             self.garbled[name] += len(messages)
             stamps, decoded = np.zeros(0, np.int64), np.zeros((0, 6))
-            return Batch(topic, messages, arrival, sent, stamps, channel_values(topic, decoded))
+            values = channel_values(topic, decoded)
+            return Batch(topic, messages, arrival, sent, stamps, values, stamps, values)
         admitted = self.gates[name].admit(stamps, arrival)
         values = channel_values(topic, decoded)
         finite = np.isfinite(values).all(axis=1)
@@ -119,7 +122,7 @@ class Intake:
         used = admitted & finite
         if self._watch_range and topic.channel in CAN_CLIP:
             self._recent[name].append(values[used])
-        return Batch(topic, messages, arrival, sent, stamps[used], values[used])
+        return Batch(topic, messages, arrival, sent, stamps[used], values[used], stamps, values)
 
     def look_for_clipping(self) -> None:
         """Count the clipped samples since the last call; called each second."""

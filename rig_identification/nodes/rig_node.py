@@ -9,12 +9,14 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
-from rig_identification.errors import RigIdentificationError
+from rig_identification.errors import InputError, RigIdentificationError
 from rig_identification.nodes.by_hand import ByHand
 from rig_identification.nodes.deferred import Later, serve_later
 from rig_identification.nodes.parameters import OwnParameter, OwnParameters
@@ -64,8 +66,21 @@ class RigNode(Node):
         yield from (one for one in super().subscriptions if id(one) not in apart)
 
     def subscribe_by_hand(self, kind: type, topic: str, qos: QoSProfile) -> ByHand:
-        """A raw subscription whose messages wait until they are taken."""
-        made = ByHand(self.create_subscription(kind, topic, _ignore, qos, raw=True))
+        """A raw subscription whose messages wait until they are taken.
+
+        Parameters ``qos_overrides.<topic>.subscription.*`` change its history, depth and reliability: a
+        driver that sends best effort is not heard otherwise. Raises InputError for one that is none.
+        """
+        try:
+            made = ByHand(
+                self.create_subscription(
+                    kind, topic, _ignore, qos, raw=True,
+                    qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+                )
+            )  # fmt: skip
+        except (InvalidQosOverridesError, InvalidParameterTypeException, RuntimeError) as error:
+            name = self.resolve_topic_name(topic)
+            raise InputError(f"parameter qos_overrides.{name}.subscription: {error}; correct it") from error
         self._by_hand.append(made)
         return made
 

@@ -17,7 +17,7 @@ from rig_identification.report.page import page_environment, script, vendored
 from rig_identification.ui.desk import APART, Desk, shown
 from rig_identification.ui.folder import Folder
 from rig_identification.ui.guard import App, Guard
-from rig_identification.ui.pages import balance, history, identify, jobs, overview, plan, rig, simulate
+from rig_identification.ui.pages import balance, history, identify, jobs, live, overview, plan, rig, simulate
 
 #: Endings of the files that the page shows, and as what.
 SHOWN = {
@@ -37,6 +37,7 @@ def application(root: Path, token: str, address: str, port: int) -> App:
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         yield
         desk.jobs.end()
+        desk.graphs.end()
 
     routes = [
         Route("/static/{name}", _static),
@@ -48,6 +49,7 @@ def application(root: Path, token: str, address: str, port: int) -> App:
         *plan.ROUTES,
         *simulate.ROUTES,
         *history.ROUTES,
+        *live.ROUTES,
         *jobs.ROUTES,
     ]
     app = Starlette(routes=routes, lifespan=lifespan)
@@ -91,6 +93,7 @@ _STATIC: dict[str, Any] = {
     "style.css": _style,
     "ui.js": lambda: _own("ui.js"),
     "charts.js": lambda: _own("charts.js"),
+    "live.js": lambda: _own("live.js"),
     "uplot.js": lambda: str(vendored("uplot", "uPlot.iife.min.js")),
     "replay.js": _replay,
 }

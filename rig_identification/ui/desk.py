@@ -16,6 +16,7 @@ from rig_identification import __version__
 from rig_identification.errors import FieldError, InputError
 from rig_identification.report.page import page_environment
 from rig_identification.ui.folder import Folder
+from rig_identification.ui.graph import Graphs
 from rig_identification.ui.jobs import Jobs
 
 #: The tasks, as they stand above every page: path, name.
@@ -27,6 +28,7 @@ TASKS = (
     ("/simulate", "Simulate"),
     ("/balance", "Centre of mass"),
     ("/identify", "Identify"),
+    ("/live", "Live"),
     ("/history", "History"),
 )
 #: A report is shown as a document without an origin: its own scripts run, and can ask this page nothing. It
@@ -43,6 +45,7 @@ class Desk:
 
     folder: Folder
     jobs: Jobs = field(default_factory=Jobs)
+    graphs: Graphs = field(default_factory=Graphs)
     templates: Environment = field(default_factory=lambda: _templates())
 
     def page(self, template: str, here: str, status: int = 200, **values: Any) -> HTMLResponse:

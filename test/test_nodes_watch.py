@@ -1,0 +1,104 @@
+"""The live verdict in the graph: what a window holds goes to the program that watches; its word is out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
+
+from node_processes import (  # noqa: F401
+    SIMULATOR,
+    Diagnostics,
+    Graph,
+    Probe,
+    graph_of_the_test,
+    probe_of_the_test,
+)
+from std_msgs.msg import String
+
+from rig_identification.nodes.gathered import Gathered, read_gathered, write_gathered
+from rig_identification.nodes.intake import Batch
+from rig_identification.nodes.rig_node import LATCHED
+from rig_identification.nodes.session_folder import RecordingPlan
+from rig_identification.recording import Dummy
+from rig_identification.topics import Topic, expected_topics
+
+SECOND = 1_000_000_000
+TOPICS = expected_topics(("cable_1",), "/rig")
+
+
+def batch(topic: Topic, first: float, count: int, width: int) -> Batch:
+    """A tenth of a second of samples."""
+    stamps = round(first * SECOND) + np.arange(count) * (SECOND // 10 // count)
+    values = np.random.default_rng(count).standard_normal((count, width))
+    arrival = stamps + 2_000_000
+    return Batch(topic, [b""] * count, arrival, arrival, stamps[1:], values[1:], stamps, values)
+
+
+def test_what_a_window_holds_is_read_as_it_came(tmp_path: Path) -> None:
+    cell, imu = TOPICS["/rig/cable_1/wrench"], TOPICS["/rig/imu/data_raw"]
+    still = Gathered(RecordingPlan("static_1", "static", dummy=Dummy(40.0, np.array([0.1, 0.2, 0.3]))), 30.0)
+    run = Gathered(RecordingPlan("run_1", "dynamic"), 2.0)
+    pieces = [batch(cell, 0.1 * k, 20, 1) for k in range(50)]
+    for k, piece in enumerate(pieces):
+        still.add(piece)
+        run.add(piece)
+        run.add(batch(imu, 0.1 * k, 10, 6))
+    assert still.whole
+    assert still.seconds == pytest.approx(5.0, abs=0.1)
+    assert not run.whole  # 2 s are held
+    assert run.seconds == pytest.approx(2.0, abs=0.25)
+    file = tmp_path / "gathered.npz"
+    write_gathered(file, [still, run])
+    rest, motion = read_gathered(file)
+    assert (rest.name, rest.kind, motion.kind) == ("static_1", "static", "dynamic")
+    assert rest.dummy is not None
+    assert (rest.dummy.mass, rest.dummy.position.tolist()) == (40.0, [0.1, 0.2, 0.3])
+    (tension,) = rest.channels
+    assert (tension.topic, tension.cable, tension.channel) == ("/rig/cable_1/wrench", "cable_1", "tension")
+    # Every message, the one that the gate refused as well
+    assert np.array_equal(tension.stamp_ns, np.concatenate([p.heard_ns for p in pieces]))
+    assert np.array_equal(tension.received_ns, np.concatenate([p.arrival_ns for p in pieces]))
+    assert np.array_equal(tension.values, np.concatenate([p.heard for p in pieces]))
+    assert [c.channel for c in motion.channels] == ["tension", "imu"]
+    assert motion.counts["/rig/imu/data_raw"] == motion.channels[1].stamp_ns.size
+
+
+@pytest.mark.long  # a graph with a cell that reads high, watched until it is told
+def test_a_cell_that_reads_high_is_told_while_the_window_is_open(graph: Graph, probe: Probe) -> None:
+    graph.start("rig_simulator", *SIMULATOR)
+    high = "simulation.gain:=[0.0, 0.015, 0.0, 0.0, 0.0, 0.0, 0.0]"
+    graph.start("load_cells", "simulation.rate:=200.0", high)
+    graph.start("imu", "simulation.rate:=200.0")
+    graph.start("inclinometer", "simulation.rate:=50.0")
+    graph.start("tracker", "marker_rate:=0.0", "tf_rate:=0.0")
+    graph.start("identifier", "planned_seconds:=40.0")
+    lines = Diagnostics(probe)
+    heard = probe.listen(String, "identifier/watch", LATCHED)
+    probe.spin_until(lines.arrivals("identifier", 50, "cable_1/wrench", "imu/data_raw"), 120.0, "samples")
+    assert not probe.set("identifier", recording__kind="static")
+    probe.call("identifier/start_window")
+    probe.spin_for(4.0)
+    probe.call("identifier/stop_window")
+    assert not probe.set("identifier", recording__kind="dynamic")
+    probe.call("rig_simulator/shake")
+    probe.call("identifier/start_window")
+    told: list[dict[str, object]] = []
+
+    def found() -> bool:
+        told[:] = [json.loads(message.data) for message in heard]
+        return any(one.get("cause") == "load_cell_gain cable_2" for one in told)
+
+    probe.spin_until(found, 120.0, "the verdict")
+    word = next(one for one in told if one.get("cause") == "load_cell_gain cable_2")
+    assert word["recording"] == "run_1"
+    assert word["verdict"] == "explained"
+    parameters = word["parameters"]
+    assert isinstance(parameters, dict)
+    assert parameters["gain"]["value"] == pytest.approx(0.015, abs=0.004)
+    assert "static_1" not in str(word["faults"])
+    probe.call("identifier/stop_window")
