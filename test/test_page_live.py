@@ -138,6 +138,7 @@ def test_a_program_nobody_looks_at_ends(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+@pytest.mark.long
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_live_page_shows_it_all(width: int, client: Client) -> None:
     with page_of(client, width) as page:

@@ -106,6 +106,8 @@ class Evidence:
             spared = most if moved else most - self._beside_rest(hypothesis.about)
             account = self._account(changed, hypothesis.loosened, self.plain, moved, spared)
             possible = account.rest is not None and hypothesis.possible(account.rest)
+            if possible and thorough and account.rest is not None:
+                possible = hypothesis.confirmed(account.rest)
             return account if possible else IMPOSSIBLE
         devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
         if hypothesis.about == {"imu.gyroscope"}:

@@ -117,6 +117,8 @@ class Hypothesis:
     fitted: Callable[[RestFit], Change] | None = None
     #: Whether the fault may have the numbers that the fit gives it.
     possible: Callable[[RestFit], bool] = lambda rest: True
+    #: ... and whether a thorough fit, which knows them best, leaves no doubt that it has.
+    confirmed: Callable[[RestFit], bool] = lambda rest: True
     free: int = 0  # numbers that the hypothesis fits
     penalty: float = 0.0  # nats that speak against it before any reading is looked at
     fresh: bool = False  # no first-order evaluation: the description itself changes

@@ -15,9 +15,9 @@ from rig_identification.examination import SetupFault
 
 #: A cell whose scale is off by more than this factor has no calibration at all.
 FAR = 2.0
-#: A cell of its own scale and zero is told from a calibrated one where one of them is off by more than this
-#: share of what it reads, and by more of its std than chance makes.
-OFF, CHANCE = 0.1, 3.0
+#: Scales and zeros of their own are told from calibrated ones where their mean square is beyond so many of their
+#: variances.
+CLEAR = 3.0
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
@@ -41,8 +41,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
         if factor > 0.0 and abs(np.log(factor)) > np.log(FAR):
             yield _counted(chosen, factor, cells)
         if factor > 0.0:
-            own = Loosened(zeros=chosen, gains=chosen)
-            yield _counted(chosen, factor, cells, own, have / len(chosen))
+            yield _counted(chosen, factor, cells, Loosened(zeros=chosen, gains=chosen))
 
 
 def _counted(
@@ -50,20 +49,19 @@ def _counted(
     factor: float,
     about: frozenset[str],
     own: Loosened | None = None,
-    reads: float = 0.0,
 ) -> Hypothesis:
-    """own: what each cell has for itself; None: one factor holds for all. reads: counts of each, in the mean.
+    """own: what each cell has for itself; None: one factor holds for all.
 
     Scales and zeros of their own take up whatever else is wrong at rest: cables that stretch let a body hang
     lower. Where they come out as a calibrated cell has them they are no counts.
     """
     uncalibrated = abs(np.log(factor)) > np.log(FAR)
 
-    def possible(rest: RestFit) -> bool:
-        parts = ((rest.value("gain"), 1.0), (rest.value("zero"), factor * reads))
-        return uncalibrated or any(
-            bool(np.any((np.abs(v) > OFF * scale) & (np.abs(v) > CHANCE * std))) for (v, std), scale in parts
-        )
+    def confirmed(rest: RestFit) -> bool:
+        if uncalibrated or own is None:
+            return True
+        off = np.concatenate([v / std for v, std in (rest.value("gain"), rest.value("zero"))])
+        return bool(np.sum(off**2) > CLEAR * 2 * len(chosen))
 
     def describe(rest: RestFit | None) -> SetupFault:
         who = "The load cells read" if len(chosen) > 1 else f"The cell of {chosen[0]} reads"
@@ -85,5 +83,5 @@ def _counted(
     out = Change(left_out=chosen)
     return Hypothesis(
         change, describe, about, variants=len(about) + 1, loosened=own or Loosened(),
-        free=1 if own is None else 2 * len(chosen), fitted=lambda rest: out, possible=possible,
+        free=1 if own is None else 2 * len(chosen), fitted=lambda rest: out, confirmed=confirmed,
     )  # fmt: skip
