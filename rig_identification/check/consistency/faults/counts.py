@@ -15,8 +15,8 @@ from rig_identification.examination import SetupFault
 
 #: A cell whose scale is off by more than this factor has no calibration at all.
 FAR = 2.0
-#: Scales and zeros of their own are told from calibrated ones where their mean square is beyond so many of their
-#: variances.
+#: Scales and zeros of their own are told from calibrated ones where their mean square is beyond so many of
+#: their variances.
 CLEAR = 3.0
 
 
