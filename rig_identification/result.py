@@ -180,3 +180,14 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, answer: Identification) -> None:
         super().__init__("interrupted")
         self.answer = answer
+
+
+def natural_size(elements: Array) -> Array:
+    """(10,) what an error of each element is to be held against.
+
+    The mass, the largest radius of gyration, each moment, and sqrt(Jii Jjj) for the products.
+    """
+    mass, (xx, yy, zz) = elements[0], elements[[4, 7, 9]]
+    moments = np.sqrt([xx * xx, xx * yy, xx * zz, yy * yy, yy * zz, zz * zz])
+    radius = np.sqrt(max(xx, yy, zz) / mass)
+    return np.concatenate([[mass], np.full(3, radius), moments])

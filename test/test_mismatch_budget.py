@@ -7,8 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from rig_identification.estimate import side_by_side
-from rig_identification.mismatch.budget import BEYOND, UNLIMITED, Budget
+from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.model import work
+from rig_identification.model.work import BEYOND
 
 
 def test_a_budget_counts_what_is_computed_after_it_was_made() -> None:

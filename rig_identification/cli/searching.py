@@ -9,8 +9,7 @@ from collections.abc import Callable
 from rig_identification.cli.batch_progress import duration
 from rig_identification.cli.plain_numbers import plain_number
 from rig_identification.cli.progress import StageProgress
-from rig_identification.mismatch.budget import BEYOND
-from rig_identification.model.work import UNIT, meter
+from rig_identification.model.work import BEYOND, UNIT, meter
 from rig_identification.report.ten_numbers import elements
 from rig_identification.result import Identification
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import detrend
 
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.rest_evidence import RestEvidence
@@ -117,8 +118,7 @@ def _ordinates(series: Series, noise: Array) -> Array | None:
     count = time.size
     frequency = np.fft.rfftfreq(count, step)
     # A straight line leaks into all that is slow
-    even = even - np.linspace(0.0, 1.0, count)[:, None] * (even[-1] - even[0])
-    power = np.abs(np.fft.rfft(even - np.mean(even, axis=0), axis=0)) ** 2 / count
+    power = np.abs(np.fft.rfft(detrend(even, axis=0), axis=0)) ** 2 / count
     moving = frequency <= min(MOTION, SHARE / step)
     moving[: DRIFTING + 1] = False
     return np.asarray(power[moving])

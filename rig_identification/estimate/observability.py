@@ -20,7 +20,7 @@ from rig_identification.estimate.hung_by_eye import beside_middle
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, left_to_go
 from rig_identification.model.definite import definite, integrated_out
-from rig_identification.result import ELEMENTS, InertialEstimate
+from rig_identification.result import ELEMENTS, InertialEstimate, natural_size
 
 Array = NDArray[np.float64]
 
@@ -152,14 +152,3 @@ def with_products(lost: set[str]) -> tuple[str, ...]:
     """
     idle = {name for name in ELEMENTS if name[0] == "J" and {f"J{a}{a}" for a in name[1:]} & lost}
     return tuple(name for name in ELEMENTS if name in lost | idle)
-
-
-def natural_size(elements: Array) -> Array:
-    """(10,) what an error of each element is to be held against.
-
-    The mass, the largest radius of gyration, each moment, and sqrt(Jii Jjj) for the products.
-    """
-    mass, (xx, yy, zz) = elements[0], elements[[4, 7, 9]]
-    moments = np.sqrt([xx * xx, xx * yy, xx * zz, yy * yy, yy * zz, zz * zz])
-    radius = np.sqrt(max(xx, yy, zz) / mass)
-    return np.concatenate([[mass], np.full(3, radius), moments])

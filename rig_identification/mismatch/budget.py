@@ -9,11 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from rig_identification.model import work
-from rig_identification.model.work import WORK, Meter
-
-#: Share of an answer's work that whole runs with what was found, and a stand-in for what was not, may take
-#: beyond: half a minute. What has not settled by then is not told.
-BEYOND = 0.25
+from rig_identification.model.work import BEYOND, WORK, Meter
 
 
 @dataclass

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.observability import elements_covariance, natural_size
+from rig_identification.estimate.observability import elements_covariance
 from rig_identification.plan.information import Laboratory
 from rig_identification.plan.menu import Item
-from rig_identification.result import ELEMENTS
+from rig_identification.result import ELEMENTS, natural_size
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.identify import runs_of
 from rig_identification.estimate.mixture import weights
-from rig_identification.estimate.observability import invert_information, natural_size
+from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Point
@@ -39,7 +39,7 @@ from rig_identification.mismatch.undecided import STATED, TIED, shared_by_places
 from rig_identification.plan.choose import Choice
 from rig_identification.plan.information import Laboratory, informations, recorded
 from rig_identification.plan.menu import Item
-from rig_identification.result import ELEMENTS
+from rig_identification.result import ELEMENTS, natural_size
 from rig_identification.simulate.start import rest_state
 
 Array = NDArray[np.float64]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
-from rig_identification.estimate.observability import elements_covariance, natural_size
+from rig_identification.estimate.observability import elements_covariance
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.model.definite import integrated_out
 from rig_identification.plan.choose import Choice, Chosen, relative_std, worst
 from rig_identification.plan.information import Laboratory, informations, laboratory
-from rig_identification.result import ELEMENTS
+from rig_identification.result import ELEMENTS, natural_size
 from rig_identification.rig import Mount, Rig
 from rig_identification.simulate import SessionSpec
 from rig_identification.simulate.thesis_case import NOISE

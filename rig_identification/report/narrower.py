@@ -12,12 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig_identification.estimate.observability import natural_size
 from rig_identification.quantity import Z_95, significant, unit_text
 from rig_identification.report.findings import AlternativeView, alternative_views
 from rig_identification.report.ten_numbers import UNITS
 from rig_identification.report.words import words
-from rig_identification.result import ELEMENTS, Identification, InertialEstimate
+from rig_identification.result import ELEMENTS, Identification, InertialEstimate, natural_size
 
 #: Steps that are shown, and the least that one takes off the interval to be shown.
 MOST, LEAST = 4, 0.03

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.evidence import Run, prepare
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.observability import inertial_estimate, natural_size
+from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.prediction import Linearised, linearise_run
+from rig_identification.result import natural_size
 from rig_identification.rig import Rig
 from rig_identification.watch.part import Force, going_on
 
