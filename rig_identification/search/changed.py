@@ -47,38 +47,45 @@ ALIKE = 0.02
 ABOUT = 0.1
 
 
-def changes_of(fitted: Fitted, first: Rung) -> list[Change]:
-    """Changes that are worth a fit, the likeliest first.
+class Asked(NamedTuple):
+    """Changes that are worth a fit, the likeliest first."""
+
+    changes: list[Change]
+    leading: bool  # whether the likeliest comes before anything that is wrong all the time
+
+
+def changes_of(fitted: Fitted, first: Rung) -> Asked:
+    """Changes that may be what is wrong.
 
     first: the model at its own level. Where that needs no wrench held-out runs are asked as well, and the
     likeliest change has to add more to the log evidence than anything that is wrong all the time. What swings
     or pulls, at any frequency or place, takes longest to ask, and comes last; not at all where the change has
-    the larger part of what is wrong. Elsewhere it has to add more than the same numbers wrong all the time.
+    the larger part of what is wrong. Beside a wrench, about a body that is bent to all of it, first order
+    ranks the same numbers over time; which ones they are a fit has to say. So a change that adds more than
+    the same numbers wrong all the time is worth one, though something else leads.
     """
     seen = _linearised(fitted, first)
     if seen is None:
-        return []
+        return Asked([], False)
     problem, evaluation = seen
     mass = mass_of(problem, evaluation)
     candidates = catalogue(problem)
     count = count_of(candidates)
     changes, always = likeliest_changes(problem, evaluation, mass, candidates)
     if not changes or changes[0].net < MEANT:
-        return []
-    if not first.alone:
-        # Beside a strong wrench, about a body that is bent to all of it, first order ranks the same numbers
-        # over time; which ones they are a fit has to say
-        own = [p.gain for p in always if p.candidate is changes[0].group.of]
-        return changes if changes[0].net > max(own, default=0.0) + MEANT else []
+        return Asked([], False)
 
     def likelier(promises: list[Promise]) -> bool:
         return changes[0].net > max((net_gain(p, count) for p in promises), default=0.0)
 
-    if not likelier(always):
-        return []
-    if changes[0].net > (1.0 - OUTSIDE) * wrong(fitted):
-        return changes
-    return changes if likelier(screen(problem, evaluation, candidates, mass)) else []
+    leading = likelier(always)
+    if not first.alone:
+        own = [p.gain for p in always if p.candidate is changes[0].group.of]
+        worth = changes[0].net > max(own, default=0.0) + MEANT
+        return Asked(changes if leading or worth else [], leading)
+    if leading and changes[0].net < (1.0 - OUTSIDE) * wrong(fitted):
+        leading = likelier(screen(problem, evaluation, candidates, mass))
+    return Asked(changes if leading else [], leading)
 
 
 def _linearised(fitted: Fitted, first: Rung) -> tuple[Problem, Evaluation] | None:

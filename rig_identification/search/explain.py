@@ -15,7 +15,7 @@ from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, wi
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided
 from rig_identification.mismatch.whole_runs import Heard, unheard
-from rig_identification.search.changed import changes_of, explained_changed
+from rig_identification.search.changed import Asked, changes_of, explained_changed
 from rig_identification.search.disagreeing import where_runs_disagree
 from rig_identification.search.events import event_beside, event_of, explained_outside, standing_out
 from rig_identification.search.expand import worthy
@@ -98,9 +98,9 @@ def _explain(
         found = explained_outside(ideal, event, rest_explained, notify, chief=True)
         if found is not None:
             return found
-    changes = [] if watched or budget.spent() else changes_of(ideal.fitted, first)
-    if changes:
-        found = explained_changed(ideal, changes, rest_explained, notify)
+    asked = Asked([], False) if watched or budget.spent() else changes_of(ideal.fitted, first)
+    if asked.leading:
+        found = explained_changed(ideal, asked.changes, rest_explained, notify)
         if found is not None:
             return found
     agreed = where_runs_disagree(ideal, notify, budget) if first.alone and not watched else None
@@ -111,6 +111,8 @@ def _explain(
         return outcome.told
     seen(outcome.rung)
     found = _beside(ideal, outcome, rest_explained, notify, budget)
+    if found is None and asked.changes and not asked.leading:
+        found = explained_changed(ideal, asked.changes, rest_explained, notify)
     if found is not None or part:
         return found
     return unexplained(ideal, outcome, budget, notify)
