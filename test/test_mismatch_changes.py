@@ -9,16 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from test_simulate_identify import shaken
+from test_simulate_identify import at_the_true_body, shaken
 
-from rig_identification.estimate.growing import settled_starts
-from rig_identification.estimate.identify import pose_problem
-from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.parameters import Parameter, Stretch
-from rig_identification.estimate.solve import Evaluation, Problem, evaluate
+from rig_identification.estimate.solve import evaluate
 from rig_identification.mismatch.changes import Change, likeliest_changes
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.model.body import (
     elements_from_linear,
@@ -65,18 +61,6 @@ def zeroed(recording: Recording, cable: str, start: float, newtons: float) -> Re
     """A load cell whose zero jumps at an instant."""
     later = from_then(recording.tension[cable], start, lambda v: v + newtons)
     return replace(recording, tension={**recording.tension, cable: later})
-
-
-def at_the_true_body(session: Session, truth: Truth) -> tuple[Problem, Evaluation]:
-    """The session under the ideal model of the true body, its start states fitted and nothing else."""
-    problem, theta, _ = pose_problem(session)
-    launch = Launch(problem, theta).from_rest().from_momentum()
-    assert launch.rest is not None
-    problem = with_reference(problem, launch.rest)
-    point = replace(launch.point(), theta=problem.bench.parameters.start(truth.elements))
-    found = evaluate(problem, replace(point, starts=settled_starts(problem, point)))
-    assert found is not None
-    return problem, found
 
 
 def change_in(session: Session, truth: Truth) -> Change | None:

@@ -13,6 +13,7 @@ from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.screen import with_reference
+from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.simulate import (
     Pulled,
@@ -40,7 +41,11 @@ def shaken(number: int, seconds: float = 6.0) -> SessionSpec:
 
 def seen_by_the_true_body(spec: SessionSpec, seed: int) -> tuple[Problem, Evaluation]:
     """A session under the ideal model of the true body, its start states fitted and nothing else."""
-    session, truth = simulate_session(spec, np.random.default_rng(seed))
+    return at_the_true_body(*simulate_session(spec, np.random.default_rng(seed)))
+
+
+def at_the_true_body(session: Session, truth: Truth) -> tuple[Problem, Evaluation]:
+    """The same of a session that is there."""
     problem, theta, _ = pose_problem(session)
     launch = Launch(problem, theta).from_rest().from_momentum()
     assert launch.rest is not None

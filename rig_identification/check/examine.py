@@ -39,11 +39,13 @@ def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> E
         if progress is not None:
             progress(f"checking {stage}")
         for examiner in examiners(package):
-            if package is not stamps or examiner.ORDER > MENDED:
+            if package is stamps and examiner.ORDER > MENDED:
                 session = in_order(session)
             for found in examiner.find(session):
                 session = found.session
                 faults.append(found.fault)
+        if package is stamps:
+            session = in_order(session)
     if progress is not None:
         progress("checking how channels agree")
     verdict = judged(session)

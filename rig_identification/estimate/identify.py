@@ -320,7 +320,7 @@ def fit_session(
     progress("first guess from rest and geometry", 0.0)
     problem, theta, held = pose_problem(session, assumed)
     fitted = fit_from(_begun(problem, theta, held, progress, soft_asked=soft_asked), progress)
-    noisy = noise_at_rest.told(slow_noise(problem.rests))
+    noisy = noise_at_rest.told((*problem.runs, *held))
     notes = (*told((*problem.runs, *held)), *note_of_center(problem), *noisy)
     fitted = replace(fitted, notes=(*notes, *fitted.notes))
     rods = rods_of(session.rig, (*problem.runs, *held))
@@ -561,9 +561,15 @@ def in_pieces_if_far(again: Fitted, notify: Progress) -> Ideal:
 def fitted_again(ideal: Ideal, runs: tuple[Run, ...], held: tuple[Run, ...], notify: Progress) -> Fitted:
     """The ideal model fitted to other stretches of its session's runs, from where nothing is bent."""
     fitted = ideal.fitted
-    problem = replace(fitted.problem, runs=runs)
     point = fitted.guess or fitted.evaluation.point
-    starts = launch_states(problem.bench, runs, point.theta, fitted.rest)
+    return fitted_anew(fitted, replace(fitted.problem, runs=runs), point, held, notify)
+
+
+def fitted_anew(
+    fitted: Fitted, problem: Problem, point: Point, held: tuple[Run, ...], notify: Progress
+) -> Fitted:
+    """Another ``problem`` of a session than it was ``fitted`` to, from a ``point`` with starts of its own."""
+    starts = launch_states(problem.bench, problem.runs, point.theta, fitted.rest)
     start = Start(
         problem,
         replace(point, starts=starts),

@@ -10,7 +10,7 @@ law), and neither a residual swing nor a line of the mains moves it.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,33 +35,16 @@ MEDIAN_STD, CHANCE = 1.44, 4.0
 Key = tuple[str, str]
 
 
-@dataclass(frozen=True)
-class Slow:
-    """Ordinates of the spectra of one quantity at rest, in units of its noise."""
-
-    ordinates: Array  # (n, w)
-
-    @property
-    def factor(self) -> Array:
-        """(w,) on the std of a sample; 1 where the noise may as well be white, or is weaker there."""
-        count = self.ordinates.shape[0]
-        power = np.median(self.ordinates, axis=0) / np.log(2.0)
-        shows = power > 1.0 + CHANCE * MEDIAN_STD / np.sqrt(count)
-        return np.where(shows & (count >= FEWEST), np.sqrt(np.maximum(power, 1.0)), 1.0)
-
-
 def slow_noise(rests: Iterable[RestEvidence]) -> dict[Key, Array]:
     """By device and quantity the factor (w,) on the noise of what is measured at rest; none where it is 1."""
     found: dict[Key, list[Array]] = {}
     for evidence in rests:
         for c in evidence.channels:
             series = _series(evidence.recording, c.device, c.quantity)
-            if series is None or len(c.components) < c.noise.size:
-                continue
-            part = _ordinates(series, c.noise)
+            part = None if series is None else _ordinates(series, c.noise)
             if part is not None:
                 found.setdefault((c.device, c.quantity), []).append(part)
-    factors = {key: Slow(np.concatenate(parts)).factor for key, parts in found.items()}
+    factors = {key: _factor(np.concatenate(parts)) for key, parts in found.items()}
     return {key: factor for key, factor in factors.items() if np.any(factor > 1.0)}
 
 
@@ -80,13 +63,26 @@ def with_slow_noise(runs: tuple[Run, ...], factors: dict[Key, Array]) -> tuple[R
     return tuple(map(louder, runs)) if factors else runs
 
 
-def told(factors: dict[Key, Array]) -> tuple[str, ...]:
-    """A sentence for each device whose noise is not white."""
+def told(runs: Iterable[Run]) -> tuple[str, ...]:
+    """A sentence for each device whose noise in some runs is not white."""
+    channels = (c for run in runs for c in run.channels)
+    slow = {(c.device, c.quantity): c.slow for c in channels if c.slow is not None}
     return tuple(
         f"{device}: its {quantity.replace('_', ' ')} is {float(np.max(factor)):.2g} times as noisy at the "
         "frequencies of the motion as its samples scatter, as it shows at rest; the fit counts on that."
-        for (device, quantity), factor in factors.items()
+        for (device, quantity), factor in slow.items()
     )
+
+
+def _factor(ordinates: Array) -> Array:
+    """(w,) on the std of a sample, of ordinates (n, w) in units of its noise.
+
+    1 where the noise may as well be white, or is weaker there.
+    """
+    count = ordinates.shape[0]
+    power = np.median(ordinates, axis=0) / np.log(2.0)
+    shows = power > 1.0 + CHANCE * MEDIAN_STD / np.sqrt(count)
+    return np.where(shows & (count >= FEWEST), np.sqrt(np.maximum(power, 1.0)), 1.0)
 
 
 def _series(recording: Recording, device: str, quantity: str) -> Series | None:

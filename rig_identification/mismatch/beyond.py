@@ -58,6 +58,13 @@ class Beyond:
         for rest, columns in zip(self.full.rests, rests, strict=False):
             cross[: self.size] += rest.jacobian.T @ columns
             gradient += columns.T @ rest.residual
+        return self.of_sums(cross, gradient)
+
+    def of_sums(self, cross: Array, gradient: Array) -> Columns:
+        """Columns of which sums over the rows in which they show are known.
+
+        cross (unknowns, c): of all unknowns' columns with these. gradient (c,).
+        """
         seen = self._scale[:, None] * cross[self.base]
         solved = cho_solve(self._factor, seen)
         own = self._scale * self.full.gradient[self.base]

@@ -1,5 +1,4 @@
-"""A number of the rig, of a device or of the body that changes at an instant, and is another one from then
-on.
+"""A number of the rig, of a device or of the body that changes at an instant.
 
 A clamp slips, an IMU is bumped, a zero jumps, a mass is taken off the body between two recordings. Any number
 that is wrong all the time may be wrong from an instant on, or in one recording alone. Of a number's column j
@@ -20,13 +19,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter, ParameterSet, Stretch
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.mismatch.screen import Promise, opened_with, promise_of
 from rig_identification.model import layout
@@ -82,7 +81,7 @@ class Change:
     @property
     def within(self) -> Stretch | None:
         """The stretch that begins within its recording; None where it happened between two of them."""
-        return next((s for s in self.stretches if s.start > 0.0), None)
+        return _within(self.stretches)
 
 
 def likeliest_changes(
@@ -98,7 +97,7 @@ def likeliest_changes(
     wide, beyond, boxed = opened
     always = [promise_of(wide, beyond, boxed, c) for c in candidates]
     groups = [*_numbers(wide.bench.parameters, candidates), _body(wide, beyond.full, mass)]
-    asked = _Asked(wide, beyond.full, beyond.base, groups)
+    asked = _Asked(wide, beyond, groups)
     best: dict[int, _Told] = {}
     for told in asked.all():
         if told.net > max(0.0, best[told.group].net if told.group in best else 0.0):
@@ -184,11 +183,6 @@ class _Told:
     stretches: tuple[Stretch, ...]
     net: float
 
-    @property
-    def within(self) -> Stretch | None:
-        """The stretch that begins within its recording."""
-        return next((s for s in self.stretches if s.start > 0.0), None)
-
 
 @dataclass(frozen=True)
 class _Part:
@@ -204,17 +198,13 @@ class _Part:
 class _Asked:
     """All changes of a linearised problem."""
 
-    def __init__(
-        self, problem: Problem, full: Evaluation, base: NDArray[np.int64], groups: list[Group]
-    ) -> None:
-        self._problem, self._full, self._base, self._groups = problem, full, base, groups
+    def __init__(self, problem: Problem, beyond: Beyond, groups: list[Group]) -> None:
+        full = beyond.full
+        self._problem, self._beyond, self._full = problem, beyond, full
         self._size = problem.bench.parameters.size
         self._maps = np.concatenate([g.columns for g in groups], axis=1)
         ends = np.cumsum([len(g.numbers) for g in groups])
         self._of = [np.arange(end - len(g.numbers), end) for end, g in zip(ends, groups, strict=True)]
-        self._scale = 1.0 / np.sqrt(np.maximum(np.diag(full.information)[base], 1e-300))
-        inside = full.information[np.ix_(base, base)] * np.outer(self._scale, self._scale)
-        self._factor = cho_factor(definite(inside + 1e-12 * np.eye(base.size)))
         starts = [run.jacobian.shape[1] - self._size for run in full.runs]
         self._places = self._size + np.concatenate([[0], np.cumsum(starts)]).astype(int)
         self._whole = {name: self._of_recording(name) for name in self._recordings()}
@@ -233,7 +223,7 @@ class _Asked:
 
     def near(self, best: _Told) -> Iterator[_Told]:
         """The same group from instants about the best one's on."""
-        there = best.within
+        there = _within(best.stretches)
         if there is None:
             return
         for index, run in enumerate(self._problem.runs):
@@ -326,10 +316,9 @@ class _Asked:
     ) -> Iterator[_Told]:
         """Every group whose rows ``part`` sums. starts: columns of a start of its own, after the groups'."""
         size = self._maps.shape[1]
-        seen = self._scale[:, None] * part.cross[self._base]
-        solved = cho_solve(self._factor, seen)
-        gradient = part.right - solved.T @ (self._scale * self._full.gradient[self._base])
-        information = self._inner(part, stretches, starts) - seen.T @ solved
+        columns = self._beyond.of_sums(part.cross, part.right)
+        gradient = columns.right
+        information = self._inner(part, stretches, starts) - columns.seen.T @ columns.solved
         if starts:
             own = definite(information[size:, size:] + 1e-9 * np.diag(np.diag(information)[size:]))
             across = np.linalg.solve(own, information[size:, :size])
@@ -353,6 +342,11 @@ class _Asked:
         index = next(i for i, run in enumerate(self._problem.runs) if _holds(run, there))
         first, last = self._places[index], self._places[index + 1]
         return np.concatenate([own, part.cross[first:last]], axis=0)
+
+
+def _within(stretches: tuple[Stretch, ...]) -> Stretch | None:
+    """The one that begins within its recording."""
+    return next((s for s in stretches if s.start > 0.0), None)
 
 
 def _holds(run: Run, stretch: Stretch) -> bool:

@@ -1,8 +1,7 @@
-"""Something that changed at an instant: found as a number that is another one from then on, and fitted as
-such.
+"""Something that changed at an instant: a number that is another one from then on is found, and fitted so.
 
 It comes before the search where it adds more to the log evidence than anything that is wrong all the time,
-and after it beside the likeliest effects. As with an event, what it leaves of the session is searched.
+and after one that explained nothing elsewhere. As with an event, what it leaves of the session is searched.
 """
 
 from __future__ import annotations
@@ -16,11 +15,12 @@ import numpy as np
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
-from rig_identification.estimate.identify import Ideal, Start, fit_from, judged
+from rig_identification.estimate.identify import Ideal, fitted_anew, judged
 from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
+from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.changes import Change, likeliest_changes, recordings_of
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
@@ -32,14 +32,13 @@ from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
 from rig_identification.model.definite import definite
 from rig_identification.result import Finding, Mismatch
 from rig_identification.search.events import OUTSIDE, Event, all_without, wrong
+from rig_identification.search.expand import MEANT
 from rig_identification.search.ladder import Rung
 
 Notify = Callable[[str, float], None]
 #: Explains what a change leaves of a session; None where the ideal model explains it.
 Explain = Callable[[Ideal], Explained | None]
 
-#: Nats that count ("positive" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
-MEANT = 3.0
 #: Share of what a change takes away that another one, to first order, may fail to take away and be fitted in
 #: its stead: of a change of hundreds of standard deviations first order knows no more.
 ALIKE = 0.02
@@ -154,9 +153,7 @@ def _simpler(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
     indices = [[wide.bench.parameters.index_of(p.name) for p in c.candidate.parameters] for c in others]
     asked = np.array([*own, *(i for columns in indices for i in columns)])
     base = np.setdiff1d(np.arange(full.information.shape[0]), asked)
-    across = full.information[np.ix_(base, asked)]
-    solved = np.linalg.solve(definite(full.information[np.ix_(base, base)]), across)
-    left = full.information[np.ix_(asked, asked)] - across.T @ solved
+    left = Beyond(full, base, wide.bench.parameters.size).within(asked)
     a, first, costs = evaluation.point.theta[own], len(own), []
     for columns in indices:
         other = np.arange(first, first + len(columns))
@@ -204,18 +201,7 @@ def _fitted_with(fitted: Fitted, change: Change, candidate: Candidate, notify: N
     problem = extended(replace(fitted.problem, runs=runs), (candidate,))
     point = carried(problem, fitted.problem, fitted.guess or fitted.evaluation.point)
     try:
-        starts = launch_states(problem.bench, runs, point.theta, fitted.rest)
-        start = Start(
-            problem,
-            replace(point, starts=starts, latents=()),
-            fitted.rest,
-            held,
-            fitted.notes,
-            fitted.held_parts,
-            fitted.unfollowed,
-            fitted.stretch,
-        )
-        return fit_from(start, notify)
+        return fitted_anew(fitted, problem, replace(point, latents=()), held, notify)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 

@@ -105,10 +105,10 @@ class Evidence:
             # Where the body may move otherwise nothing is known of what its motion costs at least
             spared = most if moved else most - self._beside_rest(hypothesis.about)
             account = self._account(changed, hypothesis.loosened, self.plain, moved, spared)
-            possible = account.rest is not None and hypothesis.possible(account.rest)
-            if possible and thorough and account.rest is not None:
-                possible = hypothesis.confirmed(account.rest)
-            return account if possible else IMPOSSIBLE
+            rest = account.rest
+            if rest is None or not hypothesis.possible(rest):
+                return IMPOSSIBLE
+            return account if not thorough or hypothesis.confirmed(rest) else IMPOSSIBLE
         devices = frozenset(name.partition(".")[0] for name in hypothesis.about)
         if hypothesis.about == {"imu.gyroscope"}:
             rest = self.plain.rest or start.rest

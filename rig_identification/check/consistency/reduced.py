@@ -136,7 +136,7 @@ def _in_motion(raw: RawRecording, channels: list[RawChannel], start: float) -> R
     values = {}
     for channel in channels:
         stamps, rows = series[channel.device]
-        if _interval(stamps) > max(kernel, NARROWEST) * SLOWER:
+        if _interval(stamps) > SLOWER * kernel:
             continue
         if channel.channel == "mocap":
             rows = _continuous(rows)

@@ -45,10 +45,7 @@ def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
 
 
 def _counted(
-    chosen: tuple[str, ...],
-    factor: float,
-    about: frozenset[str],
-    own: Loosened | None = None,
+    chosen: tuple[str, ...], factor: float, about: frozenset[str], own: Loosened | None = None
 ) -> Hypothesis:
     """own: what each cell has for itself; None: one factor holds for all.
 
@@ -58,7 +55,7 @@ def _counted(
     uncalibrated = abs(np.log(factor)) > np.log(FAR)
 
     def confirmed(rest: RestFit) -> bool:
-        if uncalibrated or own is None:
+        if uncalibrated:
             return True
         off = np.concatenate([v / std for v, std in (rest.value("gain"), rest.value("zero"))])
         return bool(np.sum(off**2) > CLEAR * 2 * len(chosen))
