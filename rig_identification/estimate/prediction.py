@@ -18,6 +18,7 @@ from rig_identification.estimate.parameters import MOUNTED, DeviceLayout, Parame
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
+from rig_identification.estimate.wander import Wander, wander, wander_of
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors, work
 from rig_identification.model.constraints import rigid_jacobian
@@ -151,6 +152,7 @@ class Linearised:
     noise: RandomWrench  # what noise drives the model with
     latent: Array  # (N, 6) wrench noise that the nominal motion holds, of a discrepancy where there is one
     readings: dict[str, sensors.Reading]  # each device at the nodes
+    wander: Wander  # what the zeros' own deviations in this run do
 
     @property
     def cost(self) -> float:
@@ -335,7 +337,10 @@ def linearise_run(
     at, which = np.concatenate(nodes)[order], which[order]
     axis, variance = np.empty(size, dtype=np.int64), np.empty(size)
     H, D = np.empty((size, motion.states.shape[1])), np.empty((size, 6))
-    columns = np.empty((size, 1 + known + starts))
+    zeros = [(i, k) for i, c in enumerate(run.channels) if _wanders(bench, c) for k in range(c.width)]
+    count = 1 + known + starts
+    columns = np.empty((size, count + len(zeros)))
+    columns[:, count:] = 0.0
     readings: dict[str, sensors.Reading] = {}
     first, settled = 0, 0.0
     for index, channel in enumerate(run.channels):
@@ -356,7 +361,10 @@ def linearise_run(
         axis[here] = np.tile(channel.axes, channel.node.size)
         variance[here] = spread.ravel()
         H[here], D[here] = in_state.reshape(spread.size, -1), in_wrench.reshape(spread.size, 6)
-        columns[here] = rows.reshape(spread.size, -1)
+        columns[here, :count] = rows.reshape(spread.size, -1)
+        for column, (of, k) in enumerate(zeros, start=count):
+            if of == index:
+                columns[here[k :: channel.width], column] = wander_of(bench.rig, channel.quantity)
     plain = columns[:, 0].copy()
     A, B, _, _, _ = motion.derivatives
     acts = extra_noise is not None or latent is not None or discrepancy is not None
@@ -377,6 +385,8 @@ def linearise_run(
     if columns.size and not max(float(np.max(columns)), -float(np.min(columns))) < LARGEST:
         # Derivatives of motions that part from each other may grow beyond every number
         return None
+    own_zeros, doubt = wander(columns[:, count:])
+    columns = own_zeros.without(columns[:, :count])
     whitened = columns[:, 1:]
     if start_only:
         whitened = np.zeros((plain.size, parameters.size + starts))
@@ -384,7 +394,7 @@ def linearise_run(
     return Linearised(
         columns[:, 0],
         whitened,
-        log_spread + settled,
+        log_spread + settled + doubt,
         motion,
         at,
         which,
@@ -396,7 +406,13 @@ def linearise_run(
         noise,
         held,
         readings,
+        own_zeros,
     )
+
+
+def _wanders(bench: Bench, channel: Channel) -> bool:
+    """Whether a channel's zero is a little another one in each recording."""
+    return wander_of(bench.rig, channel.quantity) > 0.0
 
 
 def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array, Array, Array]:

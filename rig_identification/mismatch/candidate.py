@@ -47,6 +47,8 @@ class Candidate:
     everywhere: bool = False  # every rig has some of it: only how much is a question
     per_amount: float = 0.0  # its other numbers come to no more than so much of the first; 0: to anything
     places: int = 1  # at which the effect is asked for, this one among them
+    #: By name, std of what every such device has of a number that the hypothesis adds
+    ordinary: dict[str, float] = field(default_factory=dict)
     hides: tuple[str, ...] = ()  # elements that only a motion which it stands in for would tell
 
     @property

@@ -11,8 +11,10 @@ import numpy as np
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
+from rig_identification.estimate.wander import wander_of
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import sensors
+from rig_identification.rig import Rig
 
 #: Axes of a device that may drift: what they measure, its unit, and a plausible rate (std of the prior).
 CELL = (("tension", None, "N", 2.0),)
@@ -25,7 +27,7 @@ INCLINOMETER = tuple(("inclination", a, "rad", 5e-4) for a in "xy")
 SETTLING, SETTLING_SPREAD = 0.05, 0.1
 
 
-def drifts(parameters: ParameterSet, devices: list[str], duration: float) -> list[Candidate]:
+def drifts(rig: Rig, parameters: ParameterSet, devices: list[str], duration: float) -> list[Candidate]:
     """What each axis of the ``devices`` may drift by. duration: s, of a recording."""
     fixed = {"imu": IMU, "inclinometer": INCLINOMETER}
     out, laws = [], parameters.places.laws()
@@ -41,13 +43,19 @@ def drifts(parameters: ParameterSet, devices: list[str], duration: float) -> lis
                 ),
             )
             where: dict[str, object] = {"channel": device, "axis": axis, "quantity": quantity, "law": "drift"}
-            out.append(_drift(own, unit, duration, where))
+            ordinary = wander_of(rig, quantity) / max(duration, 1.0)
+            out.append(_drift(own, unit, duration, where, ordinary))
     return out
 
 
 def _drift(
-    own: tuple[Parameter, Parameter], unit: str, duration: float, where: dict[str, object]
+    own: tuple[Parameter, Parameter],
+    unit: str,
+    duration: float,
+    where: dict[str, object],
+    ordinary: float,
 ) -> Candidate:
+    """A drift. ordinary: rate at which every such zero wanders within a recording."""
     rate, settling = own
 
     def moved(*numbers: float) -> float:
@@ -67,4 +75,5 @@ def _drift(
         "Let it warm up before recording, and zero it then.",
         where,
         tell=told,
+        ordinary={rate.name: ordinary},
     )

@@ -39,7 +39,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
         *sensor_errors(rig, parameters, devices_of(problem)),
         *bent_cells(rig, parameters, mass),
         *cross_sensitivity(rig, parameters, devices_of(problem)),
-        *drifts(parameters, devices_of(problem), longest(problem)),
+        *drifts(rig, parameters, devices_of(problem), longest(problem)),
         *rig_errors(rig, parameters),
         *mount_errors(rig, parameters),
         *shared_errors(rig, parameters),

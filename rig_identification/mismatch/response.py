@@ -90,7 +90,7 @@ def whitened_response(run: Linearised, wrenches: Array, *, smooth: bool = False)
     noise = run.noise
     filtered = (noise.through, noise.felt, noise.follow, *run.filter)
     _innovations(A, B, run.nodes, run.row_H, run.row_D, *filtered, held, smooth, out)
-    return out
+    return run.wander.without(out)
 
 
 def instant_information(run: Linearised, nodes: int = 3) -> Array:

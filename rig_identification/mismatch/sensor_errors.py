@@ -221,19 +221,27 @@ def _added(
     told: str,
     text: tuple[str, str],
     channel: str | None,
+    ordinary: float,
 ) -> Candidate:
-    """A time error that the ideal model has no doubt about."""
+    """A time error that the ideal model has no doubt about. ordinary: s, by which clocks differ anyway."""
     first, *others = entries
     p = Parameter(name, "s", 0.0, std, "device", first, bounded=False, also=tuple(others))
     where: dict[str, object] = {"channel": channel, "axis": None}
     return Candidate(
-        effect, (p,), text[0], text[1], where, positive=int(effect == "sensor_lag"), name_in_result=told
+        effect,
+        (p,),
+        text[0],
+        text[1],
+        where,
+        positive=int(effect == "sensor_lag"),
+        name_in_result=told,
+        ordinary={name: ordinary},
     )
 
 
-def _time_errors(parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
+def _time_errors(rig: Rig, parameters: ParameterSet, devices: list[str]) -> list[Candidate]:
     """Lags of every device, late stamps of load cells, which keep the time where nothing is wrong."""
-    places = parameters.places
+    places, ordinary = parameters.places, rig.tolerance["clock"]
     out = []
     lag = (
         "{channel} follows what it measures like a low-pass with a time constant of {value}.",
@@ -253,13 +261,13 @@ def _time_errors(parameters: ParameterSet, devices: list[str]) -> list[Candidate
                 "time_constant",
                 lag,
                 device,
+                ordinary,
             )
         )
         if device in places.cables:
             entry = (places.clock(device),)
-            out.append(
-                _added("clock_offset", f"{device}.clock", entry, RANGE["clock"], "offset", late, device)
-            )
+            name = f"{device}.clock"
+            out.append(_added("clock_offset", name, entry, RANGE["clock"], "offset", late, device, ordinary))
     cells = tuple(d for d in devices if d in places.cables)
     if len(cells) > 1:
         every = tuple(
@@ -275,6 +283,7 @@ def _time_errors(parameters: ParameterSet, devices: list[str]) -> list[Candidate
                 "time_constant",
                 (every[0], every[1]),
                 None,
+                ordinary,
             )
         )
     return out
@@ -287,5 +296,5 @@ def sensor_errors(rig: Rig, parameters: ParameterSet, devices: list[str]) -> lis
         *_imu(rig, parameters),
         *_inclinometer(parameters),
         *_clocks_and_exciter(parameters),
-        *_time_errors(parameters, devices),
+        *_time_errors(rig, parameters, devices),
     ]

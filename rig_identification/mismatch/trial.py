@@ -372,13 +372,14 @@ def ordinary_errors(problem: Problem) -> dict[str, float]:
 
 
 def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool:
-    """Whether a freed doubt really lies beyond what is ordinary: an addition always does."""
+    """Whether a freed doubt really lies beyond what is ordinary: an addition does that no device has."""
     parameters = trial.problem.bench.parameters
     values = parameters.named(trial.evaluation.point.theta)
-    freed = [p for p in trial.candidate.parameters if p.name in ordinary]
-    if len(freed) < len(trial.candidate.parameters):
+    known = trial.candidate.ordinary or ordinary
+    freed = [p for p in trial.candidate.parameters if p.name in known]
+    if len(freed) < len(trial.candidate.parameters) and not trial.candidate.ordinary:
         return True
-    return any(abs(values[p.name] - p.nominal) > limit * ordinary[p.name] for p in freed)
+    return any(abs(values[p.name] - p.nominal) > limit * known[p.name] for p in freed)
 
 
 def strength(trial: Trial, ordinary: dict[str, float] | None = None) -> float:
