@@ -38,6 +38,9 @@ Array = NDArray[np.float64]
 LINES = ((0.0, 0.0), (0.5 * np.pi, 0.0), (0.25 * np.pi, 0.0), (-0.25 * np.pi, 0.0), (0.0, 1.3))
 #: Widths of a brake's reach that are tried, in parts of the largest travel; 0: it does not fade.
 NARROWS = (0.0, 0.5, 2.0)
+#: How early a brake saturates: squares of the largest speed in parts of that at which it pulls most. A magnet
+#: over copper does so at some cm/s, dry friction at once.
+EARLY = (3.0, 30.0)
 #: Std of a line's angles, rad.
 TURNED = 0.5
 #: Contract-like names and units of the parts.
@@ -71,15 +74,21 @@ def spring_law(rig: Rig, scales: Scales, line: tuple[float, float]) -> Candidate
     return _law((*amounts, *angles, *_point(rig, scales)), 0)
 
 
-def brake_law(rig: Rig, scales: Scales) -> Candidate:
-    """A brake at a point that may fade with distance, with every part."""
+def brake_law(rig: Rig, scales: Scales, early: float = 0.0) -> Candidate:
+    """A brake at a point that may fade with distance, or saturates so ``early``, with every part."""
     block = layout.effects_offset(len(rig.cables))
     amounts = tuple(
         added(f"unknown.{name}", unit, scales.force / scales.speed ** (k + 1), block + place.LAW_BRAKE + k)
         for k, (name, unit) in enumerate(BRAKES)
     )
-    narrow = added("unknown.narrow", "1/m^2", 1.0 / scales.travel**2, block + place.LAW_NARROW)
-    return _law((*amounts, narrow, *_point(rig, scales)), 1)
+    bent = added("unknown.narrow", "1/m^2", 1.0 / scales.travel**2, block + place.LAW_NARROW)
+    if early > 0.0:
+        known = early / scales.speed**2
+        # Where it saturates is known by its order of magnitude, and below zero it would not
+        bent = replace(
+            added("unknown.saturation", "s^2/m^2", 1.0, block + place.LAW_SATURATION, known), ratio=True
+        )
+    return _law((*amounts, bent, *_point(rig, scales)), 1)
 
 
 def _law(parameters: tuple[Parameter, ...], positive: int) -> Candidate:
@@ -106,7 +115,16 @@ def _point(rig: Rig, scales: Scales) -> tuple[Parameter, ...]:
 def _told(found: Estimates) -> Told:
     """Every number of a law that is in the model."""
     names = [n for n in found.values if n.startswith("unknown.")]
-    units = dict((*SPRINGS, *BRAKES, ("narrow", "1/m^2"), ("azimuth", "rad"), ("elevation", "rad")))
+    units = dict(
+        (
+            *SPRINGS,
+            *BRAKES,
+            ("narrow", "1/m^2"),
+            ("saturation", "s^2/m^2"),
+            ("azimuth", "rad"),
+            ("elevation", "rad"),
+        )
+    )
     return {
         (short := n.removeprefix("unknown.").replace(".", "_")): (*found.of(n), units.get(short, "m"))
         for n in names
@@ -115,10 +133,11 @@ def _told(found: Estimates) -> Told:
 
 @dataclass(frozen=True)
 class Law:
-    """What is tried of a law at every place: a spring along a ``line``, or a brake that fades so fast."""
+    """What is tried of a law at every place: a spring along a ``line``, or a brake that fades or saturates."""
 
     line: tuple[float, float] | None
     narrow: float = 0.0  # in parts of what fades over the largest travel
+    early: float = 0.0  # squares of the largest speed in parts of that from which on it saturates
 
     @property
     def parts(self) -> tuple[tuple[str, str], ...]:
@@ -127,13 +146,17 @@ class Law:
 
     def candidate(self, rig: Rig, scales: Scales) -> Candidate:
         """The law with every part of it."""
-        return brake_law(rig, scales) if self.line is None else spring_law(rig, scales, self.line)
+        if self.line is not None:
+            return spring_law(rig, scales, self.line)
+        return brake_law(rig, scales, self.early)
 
     def values(self, law: Candidate, at: Array, amounts: Array, scales: Scales) -> dict[str, float]:
         """Values of a ``law``'s parameters at the place ``at``. amounts: in units of their std."""
         own = {q.name: q for q in law.parameters}
         known = {f"unknown.point.{a}": float(at[i]) for i, a in enumerate(AXES)}
-        if self.line is None:
+        if self.line is None and self.early > 0.0:
+            known["unknown.saturation"] = self.early / scales.speed**2
+        elif self.line is None:
             known["unknown.narrow"] = self.narrow / scales.travel**2
         else:
             known |= {"unknown.azimuth": self.line[0], "unknown.elevation": self.line[1]}
@@ -150,14 +173,18 @@ class Law:
         if self.line is not None:
             force = _pulls(u / scales.travel, *self.line)
         else:
-            force = _brakes(u / scales.travel, v / scales.speed, self.narrow)
+            force = _brakes(u / scales.travel, v / scales.speed, self.narrow, self.early)
         force = scales.force * force
         body = np.einsum("nji,njc->nic", motion.R_world_body, force)
         return np.concatenate([body, np.cross(at[None, :, None], body, axis=1)], axis=1)
 
 
 #: All laws that are tried at every place.
-LAWS = (*(Law(line) for line in LINES), *(Law(None, narrow) for narrow in NARROWS))
+LAWS = (
+    *(Law(line) for line in LINES),
+    *(Law(None, narrow) for narrow in NARROWS),
+    *(Law(None, early=early) for early in EARLY),
+)
 
 
 def _direction(azimuth: float, elevation: float) -> Array:
@@ -173,9 +200,10 @@ def _pulls(u: Array, azimuth: float, elevation: float) -> Array:
     return np.asarray(-np.concatenate([s, s**2, s**3], axis=1)[:, None, :] * d[:, None])
 
 
-def _brakes(u: Array, v: Array, narrow: float) -> Array:
+def _brakes(u: Array, v: Array, narrow: float, early: float) -> Array:
     """(N, 3, 2) force of a unit of each part of a brake at travels ``u``, velocities ``v`` (N, 3), world."""
-    fade = np.exp(-narrow * np.sum(u**2, axis=1))[:, None, None]
+    fade = np.exp(-narrow * np.sum(u**2, axis=1)) / (1.0 + early * np.sum(v**2, axis=1))
+    fade = fade[:, None, None]
     return np.asarray(-fade * np.stack([v, np.linalg.norm(v, axis=1)[:, None] * v], axis=2))
 
 
@@ -232,6 +260,8 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     )
     acts = f"along {axis}" if parts[0] in dict(SPRINGS) else "against its motion"
     fades = " and fades with distance from where that point hangs at rest" if "narrow" in told else ""
+    if "saturation" in told:
+        fades = f", and saturates at about {plain_figure(float(told['saturation']['value']) ** -0.5)} m/s"
     size = float(np.max(extent(fitted.problem.bench.rig)))
     # A point slides along its own force's line without a change
     known = [float(told[f"point_{a}"]["std"]) < VAGUE * size for a in AXES]
@@ -249,4 +279,5 @@ def _force(model: RigModel, motion: Motion, at: Array) -> Array:
     block = layout.effects_offset(model.cables)
     p, (u, v) = model.physics[block:], followed(model, motion, at)
     pulls = _pulls(u, *p[place.LAW_DIRECTION :][:2]) @ p[place.LAW_SPRING :][:3]
-    return np.asarray(pulls + _brakes(u, v, p[place.LAW_NARROW]) @ p[place.LAW_BRAKE :][:2])
+    brakes = _brakes(u, v, p[place.LAW_NARROW], p[place.LAW_SATURATION])
+    return np.asarray(pulls + brakes @ p[place.LAW_BRAKE :][:2])

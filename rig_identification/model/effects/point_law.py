@@ -2,11 +2,12 @@
 
 With q the point, u = q - q0 its travel from where it hangs at rest (a constant of the session) and v its
 velocity, all in the world,
-    F = -(k1 s + k2 s^2 + k3 s^3) d - (c1 + c2 |v|) exp(-n |u|^2) v,    s = d . u
+    F = -(k1 s + k2 s^2 + k3 s^3) d - (c1 + c2 |v|) exp(-n |u|^2) v / (1 + w |v|^2),    s = d . u
 The first part is a spring along the line d that hardens, softens or pushes (a magnet, a bush, a belt); it
 keeps energy, its potential being k1 s^2/2 + k2 s^3/3 + k3 s^4/4. The second is a brake to all sides that may
-fade with distance (an eddy-current brake, a rubbing brush, a sail away from the centre of mass); with c1, c2
->= 0 it only takes energy out. d = (cos e cos a, cos e sin a, sin e), azimuth a and elevation e.
+fade with distance (an eddy-current brake, a rubbing brush, a sail away from the centre of mass) or saturate:
+an eddy-current brake pulls most at the speed 1/sqrt(w), and dry friction no more at any speed above that
+(c2/w). With c1, c2 >= 0 it only takes energy out. d = (cos e cos a, cos e sin a, sin e), azimuth a and elevation e.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rig_identification.model.arithmetic import root
+from rig_identification.model.arithmetic import reciprocal, root
 from rig_identification.model.effects.center import velocity_of
 from rig_identification.model.effects.place import (
     LAW_BRAKE,
     LAW_DIRECTION,
     LAW_NARROW,
     LAW_POINT,
+    LAW_SATURATION,
     LAW_SPRING,
     active,
 )
@@ -49,6 +51,7 @@ def add_point_law(physics, block, x, R, r):  # type: ignore[no-untyped-def]
         # 1e-12 m^2/s^2 keeps the root's derivative finite at rest
         speed = root(bx * bx + by * by + bz * bz + 1e-12)
         fade = np.exp(-physics[block + LAW_NARROW] * (ux * ux + uy * uy + uz * uz))
+        fade = fade * reciprocal(1.0 + physics[block + LAW_SATURATION] * speed * speed)
         factor = -(physics[c] + physics[c + 1] * speed) * fade
         ax, ay, az = physics[point], physics[point + 1], physics[point + 2]
         force_at(ax, ay, az, factor * bx, factor * by, factor * bz, r)
