@@ -115,6 +115,7 @@ def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> No
         ("rig_simulator", "effect.air_drag:=-3.0", "parameter effect.air_drag: -3.0 m^2 is not within"),
         ("rig_simulator", "body.inertia:=[1.0, 0.0, 0.0, 1.0, 0.0, 900.0]", "no body has"),
         ("replay", "session:=/nowhere", "/nowhere: session does not exist"),
+        ("identifier", "planned_force:=/nowhere.csv", "parameter planned_force: /nowhere.csv: No such file"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused_by_name(graph: Graph, name: str, parameter: str, words: str) -> None:

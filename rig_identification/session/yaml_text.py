@@ -31,21 +31,21 @@ class TooMuch(ValueError):
     """A text beyond the limits; the message says which, without the file's name."""
 
 
-def read_text(file: Path) -> str:
+def read_text(file: Path, largest: int = LARGEST) -> str:
     """Text of a regular file.
 
     Raises
     ------
     TooMuch
-        The file is larger than ``LARGEST`` bytes, or is no regular file, which might never end.
+        The file is larger than ``largest`` bytes, or is no regular file, which might never end.
     OSError, UnicodeDecodeError
         As of ``Path.read_text``.
     """
     size = file.stat().st_size
     if file.exists() and not (file.is_file() or file.is_dir()):
         raise TooMuch("it is a device or a pipe; give a file")
-    if size > LARGEST and file.is_file():
-        raise TooMuch(f"{size} bytes are more than the {LARGEST} that such a file may have")
+    if size > largest and file.is_file():
+        raise TooMuch(f"{size} bytes are more than the {largest} that such a file may have")
     return file.read_text(encoding="utf-8")
 
 
