@@ -49,6 +49,20 @@ def read_text(file: Path, largest: int = LARGEST) -> str:
     return file.read_text(encoding="utf-8")
 
 
+def beginning_of(file: Path, size: int) -> str:
+    """The first ``size`` bytes of a file as far as they are text; "" for what cannot be read or is no file.
+
+    A pipe or a device might never end, and a link to itself leads nowhere.
+    """
+    if not file.is_file():
+        return ""
+    try:
+        with file.open("rb") as stream:
+            return stream.read(size).decode("utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
 def load_yaml(text: str) -> object:
     """Content of a YAML 1.2 document.
 
