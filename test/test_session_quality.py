@@ -313,3 +313,13 @@ def test_any_stamps_give_a_clock_that_runs_forwards(pair: tuple[np.ndarray, np.n
     assert np.all(stamps[selection.kept] > 0)
     assert (len(selection.kept) > 0) == bool(np.any(stamps > 0))
     assert min(selection.duplicated, selection.backward) >= 0
+
+
+@pytest.mark.parametrize(("pause", "kept"), [(600.0, 300), (1e9, 200)])
+def test_both_clocks_that_jump_for_years_are_no_pause(pause: float, kept: int) -> None:
+    """A machine without a battery finds its network: stamps and receive times jump together."""
+    stamps = (1 + np.arange(300)) * 20_000_000 + 1_793_243_600_000_000_000
+    stamps[200:] += round(pause * 1e9)
+    selection = select_stamps(stamps, stamps + 2_000_000)
+    assert selection.kept.tolist() == list(range(kept))
+    assert bool(selection.notes) == (kept < 300)
