@@ -123,6 +123,15 @@ def test_a_run_is_watched_from_its_beginning_on() -> None:
     later = watching.look(raw_of(so_far(session, 8.0)), whole=False)
     assert later.verdict == "none"
     assert later.forecast == told.forecast
+    # The same look by whom the plan is known: the exciter was told to begin 1.2 s before the window was open
+    motor = shaken(10, SECONDS).runs[0].force
+    assert motor is not None
+    at = np.arange(0.0, SECONDS, 0.02)
+    plans = {"shake": Series(at, motor(at - 1.2))}
+    knowing = Watching(Expected(seconds=SECONDS, aim=0.5, forces=plans))
+    planned = knowing.look(raw_of(so_far(session, 4.5))).forecast
+    assert planned is not None
+    assert planned["force"] == "planned"
 
 
 def test_a_length_that_is_enough_lies_between_those_looked_at() -> None:
