@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
 
 from node_processes import (  # noqa: F401
+    _DOMAINS,
+    PACKAGE,
     RIG,
     SIMULATOR,
     Diagnostics,
@@ -84,6 +87,50 @@ def test_the_program_that_watches_takes_a_planned_force(tmp_path: Path) -> None:
     assert (ended().returncode, ended().stdout) == (0, "")
     commands.write_text("nothing\n")
     assert "column recording is missing" in ended().stderr
+
+
+#: An identifier whose window is long enough to be looked at ends, and works off what had come in by then.
+ENDED = """\
+import sys, tempfile
+import numpy as np
+import rclpy
+from rig_identification.nodes.gathered import Gathered
+from rig_identification.nodes.identifier import IdentifierNode
+from rig_identification.nodes.intake import Batch
+from rig_identification.nodes.session_folder import RecordingPlan
+from rig_identification.topics import expected_topics
+rclpy.init(args=sys.argv)
+node = IdentifierNode()
+watcher = node.watcher
+watcher.start(RecordingPlan("run_1", "dynamic"))
+topic = expected_topics(("cable_1",), "/rig")["/rig/cable_1/wrench"]
+stamps = np.arange(60) * 500_000_000
+values = np.zeros((60, 1))
+watcher.add(Batch(topic, [b""] * 60, stamps, stamps, stamps, values, stamps, values))
+watcher.look()
+first = watcher._process.pid
+node.close()
+watcher.look()
+print(first, watcher._process, watcher._folder)
+node.destroy_node()
+rclpy.try_shutdown()
+"""
+
+
+def test_a_node_that_ends_starts_no_other_look(tmp_path: Path) -> None:
+    (tmp_path / "rig.yaml").write_text(RIG)
+    given = ["--ros-args", "--params-file", str(tmp_path / "rig.yaml"), "-r", "__ns:=/rig"]
+    path = os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")])
+    more = {"PYTHONPATH": path, "ROS_DOMAIN_ID": str(next(_DOMAINS)), "ROS_LOG_DIR": str(tmp_path / "log")}
+    done = subprocess.run(
+        [sys.executable, "-c", ENDED, *given], cwd=tmp_path,
+        env={**os.environ, **more, "TMPDIR": str(tmp_path)},
+        capture_output=True, text=True, timeout=240.0, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].split()[1:] == ["None", "None"]
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.glob("rig_watch_*"))
 
 
 @pytest.mark.long  # a graph with a cell that reads high, watched until it is told

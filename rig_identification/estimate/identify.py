@@ -36,6 +36,7 @@ from rig_identification.estimate.hung_by_eye import note_of as note_of_center
 from rig_identification.estimate.joint_information import joint_information
 from rig_identification.estimate.launch import REGRESSED, Launch, launch_states, tracked
 from rig_identification.estimate.mixture import Bodies, mixture
+from rig_identification.estimate.mount_by_lengths import mount_by_lengths
 from rig_identification.estimate.noise_at_rest import slow_noise, with_slow_noise
 from rig_identification.estimate.observability import inertial_estimate, unsettled
 from rig_identification.estimate.parameters import INERTIAL, parameter_set
@@ -112,7 +113,7 @@ def pose_problem(session: Session, assumed: Assumed | None = None) -> tuple[Prob
     rests = tuple(r for r in (prepare_rest(rig, recording) for recording in session.statics) if r.channels)
     if not (runs or rests):
         _refuse(session, held)
-    slow = slow_noise(rests)
+    slow = slow_noise(rests, max((run.exciter_noise for run in runs), default=0.0))
     runs, held = with_slow_noise(runs, slow), with_slow_noise(held, slow)
     model = with_rods(model, rig, rods_of(rig, (*runs, *held)))
     if not any(run.watched for run in runs):
@@ -178,19 +179,28 @@ def _measured_start(problem: Problem, theta: Array, held: tuple[Run, ...], progr
     watched = next((run for run in problem.runs if run.watched), None)
     if watched is None:
         return Start(problem, launch.from_momentum().point(), launch.rest, held)
-    if problem.bench.rig.mocap is not None:
-        mount: MocapMount | None = mocap_mount(problem.bench.rig, watched, launch.rest, 0.0)
-    elif any(c.device == "imu" for c in watched.channels) and seen_whole(watched):
-        track = tracked(blind.bench, without_mocap(watched).until(REGRESSED), launch.theta, launch.rest)
-        mount = None if track is None else mount_from_track(watched, track)
-    else:
-        found = scan(problem, watched)
-        mount = None if found is None else found.problem.bench.mocap
-    if mount is None:
-        mount = mocap_mount(problem.bench.rig, watched, launch.rest, 0.0)
+    mount, theta = _mounted(problem, launch, launch.rest, watched)
+    launch = replace(launch, theta=theta)
     problem = replace(problem, bench=replace(problem.bench, mocap=mount))
     launch = replace(launch, problem=problem).from_momentum()
     return Start(problem, launch.point(), launch.rest or launch.starts[0], held)
+
+
+def _mounted(problem: Problem, launch: Launch, rest: State, watched: Run) -> tuple[MocapMount, Array]:
+    """The tracker's mount as the description, the IMU, the cables or a scan tell it, and the body then."""
+    rig, mount, theta = problem.bench.rig, None, launch.theta
+    if rig.mocap is not None:
+        return mocap_mount(rig, watched, rest, 0.0), theta
+    if any(c.device == "imu" for c in watched.channels) and seen_whole(watched):
+        track = tracked(launch.problem.bench, without_mocap(watched).until(REGRESSED), theta, rest)
+        mount = None if track is None else mount_from_track(watched, track)
+    else:
+        found = mount_by_lengths(problem.bench, watched.until(REGRESSED), rest, theta, problem.weak)
+        if found is not None:
+            return found.mount, found.theta
+        scanned = scan(problem, watched)
+        mount = None if scanned is None else scanned.problem.bench.mocap
+    return mount or mocap_mount(rig, watched, rest, 0.0), theta
 
 
 def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) -> Start | None:

@@ -3,14 +3,19 @@
 Real sensors' noise is not white: a filter takes its upper part, an amplifier and a bias that wanders add to
 its lower part. One std of a sample, as a description has it, is then too small where the body moves, by the
 root of the spectrum there over its mean. A fit that believes it claims too much, and finds physics in noise.
-At rest nothing else moves: the median ordinate of the spectrum there is ln 2 times the mean one (exponential
-law), and neither a residual swing nor a line of the mains moves it.
+
+At rest nothing else moves. The spectrum's logarithm is a sum of a few cosines of the frequency (Bloomfield,
+Biometrika 60, 1973), which all axes of a device share beside a level of their own. It is fitted to medians of
+ordinates over bands: one is ln 2 times the mean (exponential law), and neither a residual swing nor a line of
+the mains moves it. So every frequency tells of the few at which the body moves. Load cells of one make share
+their cosines too, where that describes them all as well as cosines of each.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,27 +29,44 @@ Array = NDArray[np.float64]
 
 #: Hz up to which a rig moves, and the share of the samples' rate that this is at most.
 MOTION, SHARE = 10.0, 0.125
-#: Ordinates of the spectrum that are left out at its lower end, where a zero drifts, and the fewest that
-#: tell.
-DRIFTING, FEWEST = 3, 24
-#: Std of a median of n exponential ordinates over their mean, times sqrt(n); and in how many of them noise
-#: that is white is not told.
-MEDIAN_STD, CHANCE = 1.44, 4.0
+#: Ordinates that are left out at the lower end, where a zero drifts; those of a band, and the fewest bands.
+DRIFTING, BAND, FEWEST = 3, 12, 4
+#: Cosines of a spectrum's logarithm at most.
+COSINES = 3
+#: Std of the logarithm of a median of n exponential ordinates, times sqrt(n); and by how many of its own a
+#: spectrum has to be above what is described.
+MEDIAN_STD, CHANCE = 1.44, 3.0
 
 #: Device and quantity.
 Key = tuple[str, str]
+#: ... of the exciter's force, which drives the model.
+FORCE: Key = ("exciter", "exciter_force")
 
 
-def slow_noise(rests: Iterable[RestEvidence]) -> dict[Key, Array]:
-    """By device and quantity the factor (w,) on the noise of what is measured at rest; none where it is 1."""
-    found: dict[Key, list[Array]] = {}
+def slow_noise(rests: Iterable[RestEvidence], exciter_noise: float = 0.0) -> dict[Key, Array]:
+    """By device and quantity the factor (w,) on the noise of what is measured at rest; none where it is 1.
+
+    exciter_noise: std (N) of a sample of the exciter's force; 0: it is not measured.
+    """
+    found: dict[Key, list[Bands]] = {}
     for evidence in rests:
         for c in evidence.channels:
             series = _series(evidence.recording, c.device, c.quantity)
-            part = None if series is None else _ordinates(series, c.noise)
+            part = None if series is None else _bands(series, c.noise)
             if part is not None:
                 found.setdefault((c.device, c.quantity), []).append(part)
-    factors = {key: _factor(np.concatenate(parts)) for key, parts in found.items()}
+        force = evidence.recording.exciter_force
+        if force is not None and exciter_noise > 0.0 and np.isfinite(force.values).all():
+            part = _bands(force, np.full(force.values.shape[1], exciter_noise))
+            if part is not None:
+                found.setdefault(FORCE, []).append(part)
+    factors: dict[Key, Array] = {}
+    for quantity in {quantity for _, quantity in found}:
+        devices = {key: parts for key, parts in found.items() if key[1] == quantity}
+        alone = [_fitted({key: parts}) for key, parts in devices.items()]
+        alike = _fitted(devices)
+        chosen = [alike] if alike.criterion < sum(fit.criterion for fit in alone) else alone
+        factors |= {key: factor for fit in chosen for key, factor in fit.factors.items()}
     return {key: factor for key, factor in factors.items() if np.any(factor > 1.0)}
 
 
@@ -58,7 +80,8 @@ def with_slow_noise(runs: tuple[Run, ...], factors: dict[Key, Array]) -> tuple[R
             else c
             for c in run.channels
         )
-        return replace(run, channels=channels)
+        exciter = run.exciter_noise * float(np.max(factors.get(FORCE, 1.0)))
+        return replace(run, channels=channels, exciter_noise=exciter)
 
     return tuple(map(louder, runs)) if factors else runs
 
@@ -74,15 +97,60 @@ def told(runs: Iterable[Run]) -> tuple[str, ...]:
     )
 
 
-def _factor(ordinates: Array) -> Array:
-    """(w,) on the std of a sample, of ordinates (n, w) in units of its noise.
+class Bands(NamedTuple):
+    """A spectrum at rest, in units of white noise as described, by bands."""
 
-    1 where the noise may as well be white, or is weaker there.
-    """
-    count = ordinates.shape[0]
-    power = np.median(ordinates, axis=0) / np.log(2.0)
-    shows = power > 1.0 + CHANCE * MEDIAN_STD / np.sqrt(count)
-    return np.where(shows & (count >= FEWEST), np.sqrt(np.maximum(power, 1.0)), 1.0)
+    angle: Array  # (b,) rad from one sample to the next, of a band's middle
+    power: Array  # (b, w) of each axis
+    ordinates: Array  # (b,) in each
+    moving: float  # angle up to which a rig moves
+
+
+class Fit(NamedTuple):
+    """Spectra of devices that share their cosines."""
+
+    criterion: float  # Schwarz's, less what levels cost
+    factors: dict[Key, Array]  # (w,) on the std of a sample; 1 where it may as well be as described
+
+
+def _fitted(devices: dict[Key, list[Bands]]) -> Fit:
+    """As many cosines as the logarithms of all the bands' powers ask for (Schwarz's criterion)."""
+    level, angle, weight, values, first = [], [], [], [], [0]
+    for parts in devices.values():
+        width = parts[0].power.shape[1]
+        for part in parts:
+            for k in range(width):
+                level.append(np.full(part.angle.size, first[-1] + k))
+                angle.append(part.angle)
+                weight.append(np.sqrt(part.ordinates) / MEDIAN_STD)
+                values.append(np.log(part.power[:, k]))
+        first.append(first[-1] + width)
+    levels, w = np.eye(first[-1])[np.concatenate(level)], np.concatenate(weight)
+    x, y = np.concatenate(angle), np.concatenate(values) * w
+    best: tuple[float, Array, Array] | None = None
+    for cosines in range(COSINES + 1):
+        columns = np.concatenate([levels, _cosines(x, cosines)], axis=1) * w[:, None]
+        inverse = np.linalg.inv(columns.T @ columns)
+        found = inverse @ columns.T @ y
+        criterion = float(np.sum((y - columns @ found) ** 2)) + cosines * np.log(y.size)
+        if best is None or criterion < best[0]:
+            best = criterion, found, inverse
+    assert best is not None
+    criterion, found, inverse = best
+    factors = {}
+    for k, (key, parts) in enumerate(devices.items()):
+        there = np.linspace(0.0, min(part.moving for part in parts), 9)
+        own = np.eye(first[-1])[first[k] : first[k + 1]]
+        shape = np.mean(_cosines(there, found.size - first[-1]), axis=0)
+        rows = np.concatenate([own, np.tile(shape, (own.shape[0], 1))], axis=1)
+        above, std = rows @ found, np.sqrt(np.einsum("ij,jk,ik->i", rows, inverse, rows))
+        factors[key] = np.where(above > CHANCE * std, np.exp(0.5 * np.maximum(above, 0.0)), 1.0)
+    return Fit(criterion, factors)
+
+
+def _cosines(angle: Array, count: int) -> Array:
+    """(n, count) cosines of once, twice, ... the angles."""
+    return np.asarray(np.cos(np.outer(angle, np.arange(1, count + 1))))
 
 
 def _series(recording: Recording, device: str, quantity: str) -> Series | None:
@@ -101,20 +169,26 @@ def _series(recording: Recording, device: str, quantity: str) -> Series | None:
     return Series(whole.time, whole.values[:, columns])
 
 
-def _ordinates(series: Series, noise: Array) -> Array | None:
-    """(n, w) ordinates of a spectrum at the motion's frequencies, of samples in units of their noise.
+def _bands(series: Series, noise: Array) -> Bands | None:
+    """The spectrum of samples in units of their noise; None of too few to tell.
 
     A sample that is missing here and there is drawn between its neighbours.
     """
-    step = float(np.median(np.diff(series.time))) if series.time.size > 2 * FEWEST else 0.0
+    step = float(np.median(np.diff(series.time))) if series.time.size > 2 * FEWEST * BAND else 0.0
     if step <= 0.0 or noise.size != series.values.shape[1]:
         return None
     time = np.arange(series.time[0], series.time[-1], step)
     even = np.stack([np.interp(time, series.time, v) for v in series.values.T], axis=1) / noise
-    count = time.size
-    frequency = np.fft.rfftfreq(count, step)
     # A straight line leaks into all that is slow
-    power = np.abs(np.fft.rfft(detrend(even, axis=0), axis=0)) ** 2 / count
-    moving = frequency <= min(MOTION, SHARE / step)
-    moving[: DRIFTING + 1] = False
-    return np.asarray(power[moving])
+    power = np.abs(np.fft.rfft(detrend(even, axis=0), axis=0)) ** 2 / time.size
+    angle = 2.0 * np.pi * np.fft.rfftfreq(time.size)
+    kept = np.array_split(np.arange(DRIFTING + 1, angle.size - 1), max(1, (angle.size - DRIFTING) // BAND))
+    if len(kept) < FEWEST:
+        return None
+    medians = np.stack([np.median(power[band], axis=0) for band in kept]) / np.log(2.0)
+    return Bands(
+        np.array([np.mean(angle[band]) for band in kept]),
+        np.maximum(medians, np.finfo(np.float64).tiny),
+        np.array([band.size for band in kept], dtype=np.float64),
+        2.0 * np.pi * min(MOTION * step, SHARE),
+    )

@@ -134,8 +134,11 @@ class Heard:
 
     @property
     def contradicted(self) -> bool:
-        """Whether a held-out run asks for parameters so far off that the model is none of the rig."""
-        return any(d.excess > APPROXIMATE for d in self.contradicting())
+        """Whether a held-out run asks for parameters so far off that the model is none of the rig.
+
+        What the fitted runs show to be left of the model moves the parameters as well, and counts.
+        """
+        return any(d.excess > max(APPROXIMATE, self._loudest) for d in self.contradicting())
 
     @property
     def looseness(self) -> float:
@@ -144,8 +147,12 @@ class Heard:
         The largest power of a band that is not noise, in units of white noise, or the variance of what
         held-out runs ask for beyond their fit's, whichever is larger.
         """
-        loud = [w.band.power for w in self.witnesses if self.unlikely(w.band.log10_p)]
-        return max([1.0, *loud, *(d.excess for d in self.contradicting())])
+        return max([self._loudest, *(d.excess for d in self.contradicting())])
+
+    @property
+    def _loudest(self) -> float:
+        """The largest power of a band that is not noise, in units of white noise; 1 where there is none."""
+        return max([1.0, *(w.band.power for w in self.witnesses if self.unlikely(w.band.log10_p))])
 
 
 def hear(fitted: Fitted) -> Heard:

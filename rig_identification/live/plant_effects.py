@@ -77,8 +77,8 @@ class YieldingCeiling:
 class PlantEffects:
     """How the plant differs from the ideal rig of its description; as it comes: not at all."""
 
-    hinge_damping: float = 0.0  # N m s/rad, each hinge
-    hinge_friction: float = 0.0  # N m, each hinge
+    hinge_damping: Array | float = 0.0  # N m s/rad, hinges of each cable or of all
+    hinge_friction: Array | float = 0.0  # N m, hinges of each cable or of all
     hinge_bending: Array = field(default_factory=lambda: np.zeros(2))  # N m s/rad, at ceiling and body
     held_ends: Array = field(default_factory=lambda: np.zeros((1, 3)))  # N m/rad, xx xy yy, each cable or all
     air_drag: float = 0.0  # m^2, Cd A
@@ -87,6 +87,7 @@ class PlantEffects:
     air_plate: float = 0.0  # m^2, Cd A of one flat side
     air_plate_normal: Array = field(default_factory=lambda: np.zeros(2))  # rad, azimuth and elevation, body
     air_plate_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
+    air_plate_along: float = 0.0  # 1, share of the speed along it that counts
     spin: Array = field(default_factory=lambda: np.zeros(3))  # N m s, body: of what spins on the body
     turning_cube: float = 0.0  # N m
     air_added_mass: float = 0.0  # kg
@@ -126,8 +127,14 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     elastic = _elastic(model, effects)
     physics = _with_rig_errors(elastic, effects)
     block = place.effects_block(model.cables)
-    physics[block + place.DAMPING] = effects.hinge_damping
-    physics[block + place.FRICTION] = effects.hinge_friction
+    for shared, own, given in (
+        (place.DAMPING, layout.HINGE_DAMPING, effects.hinge_damping),
+        (place.FRICTION, layout.HINGE_FRICTION, effects.hinge_friction),
+    ):
+        each = np.broadcast_to(given, model.cables)
+        physics[block + shared] = np.min(each)
+        for i, more in enumerate(each - np.min(each)):
+            physics[layout.cable_offset(i) + own] = more
     physics[block + place.BENDING : block + place.BENDING + 2] = effects.hinge_bending
     physics[block + place.LEANING] = float(np.any(effects.held_ends))
     for i, held in enumerate(np.broadcast_to(effects.held_ends, (model.cables, 3))):
@@ -139,6 +146,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.AIR_PLATE] = effects.air_plate
     physics[block + place.AIR_PLATE_NORMAL : block + place.AIR_PLATE_NORMAL + 2] = effects.air_plate_normal
     physics[block + place.AIR_PLATE_POINT : block + place.AIR_PLATE_POINT + 3] = effects.air_plate_point
+    physics[block + place.AIR_PLATE_ALONG] = effects.air_plate_along
     physics[block + place.SPIN : block + place.SPIN + 3] = effects.spin
     physics[block + place.TURNING_CUBE] = effects.turning_cube
     physics[block + place.ADDED_MASS] = effects.air_added_mass

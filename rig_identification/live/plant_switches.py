@@ -62,8 +62,8 @@ _PLACE = (-100.0, 100.0, "m", 3)
 _METRE = (-1.0, 1.0, "m")
 _NOWHERE, _X = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 SWITCHES = (
-    Switch("hinge_damping", 0.0, "N m s/rad of each hinge", 0.0, 1e6),
-    Switch("hinge_friction", 0.0, "N m of each hinge", 0.0, 1e6),
+    Switch("hinge_damping", (0.0,), "N m s/rad of hinges, each cable's or all", 0.0, 1e6, "", CABLE),
+    Switch("hinge_friction", (0.0,), "N m of hinges, each cable's or all", 0.0, 1e6, "", CABLE),
     Switch("hinge_bending", (0.0, 0.0), "N m s/rad of bending hinges: ceiling, body", 0.0, 1e6, "", 2),
     Switch("held_ends", (0.0,), "N m/rad: xx, xy, yy of upper ends, each or all", -1e9, 1e9, "", POINTS),
     Switch("air_drag", 0.0, "Cd A, m^2", 0.0, 1e4, "m^2"),
@@ -72,6 +72,7 @@ SWITCHES = (
     Switch("air_plate", 0.0, "Cd A of one flat side", 0.0, 1e4, "m^2"),
     Switch("air_plate.normal", (0.0, 0.0), "azimuth and elevation of its normal in the body", -7.0, 7.0,
     "rad", 2), Switch("air_plate.point", (0.0, 0.0, 0.0), "its place in the body", -100.0, 100.0, "m", 3),
+    Switch("air_plate.along", 0.0, "share of the speed along it that counts: 0 to 1", 0.0, 1.0),
     Switch("spin", (0.0, 0.0, 0.0), "angular momentum of what spins on the body, body axes", -1e6, 1e6,
     "N m s", 3), Switch("turning_cube", 0.0, "N m against the cube of the turn's sine; softens below 0",
     -1e6, 1e6), Switch("air_added_mass", 0.0, "kg of entrained air", 0.0, 1e4, "kg"),
@@ -171,8 +172,8 @@ def effects_of(
         number("external_force.duration"),
     )
     return PlantEffects(
-        hinge_damping=number("hinge_damping"),
-        hinge_friction=number("hinge_friction"),
+        hinge_damping=values["hinge_damping"],
+        hinge_friction=values["hinge_friction"],
         hinge_bending=values["hinge_bending"],
         held_ends=_tensors(values["held_ends"]),
         air_drag=number("air_drag"),
@@ -181,6 +182,7 @@ def effects_of(
         air_plate=number("air_plate"),
         air_plate_normal=values["air_plate.normal"],
         air_plate_point=values["air_plate.point"],
+        air_plate_along=number("air_plate.along"),
         spin=values["spin"],
         turning_cube=number("turning_cube"),
         air_added_mass=number("air_added_mass"),

@@ -8,11 +8,10 @@ import numpy as np
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.parameters import INERTIAL, ParameterSet
+from rig_identification.estimate.parameters import INERTIAL, Parameter, ParameterSet
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.own_effects import own_hypotheses
-from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.tethers import tethers
 from rig_identification.model import layout
 from rig_identification.model.body import (
@@ -55,44 +54,9 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     """
     n = len(rig.cables)
     block = layout.effects_offset(n)
-    length = float(np.mean([c.length for c in rig.cables]))
     size = float(np.max(extent(rig)))
-    speed = np.sqrt(rig.gravity * length)
-
-    def rubbing(found: Estimates) -> Told:
-        return {
-            "torque": (*found.of("hinge.friction"), "N*m"),
-            "creep_rate": (*found.of("hinge.creep"), "rad/s"),
-        }
-
     out = [
-        Candidate(
-            "hinge_damping",
-            (
-                added(
-                    "hinge.damping", "N*m*s/rad", 0.1 * mass * length * speed / (2 * n), block + place.DAMPING
-                ),
-            ),
-            "The cables' hinges damp the motion: each puts {value} against the rate at which it turns.",
-            "Use knife edges or ball joints, or keep the damping in the model.",
-            {"channel": None, "axis": None},
-            positive=1,
-            name_in_result="damping",
-        ),
-        Candidate(
-            "hinge_friction",
-            (
-                added("hinge.friction", "N*m", 0.003 * mass * rig.gravity / n, block + place.FRICTION),
-                replace(
-                    added("hinge.creep", "rad/s", CREEP_SPREAD, block + place.CREEP, CREEP_RATE), ratio=True
-                ),
-            ),
-            "The cables' hinges rub: each holds against turning with {value}.",
-            "Grease or replace the hinges; dry friction spoils small motions most.",
-            {"channel": None, "axis": None},
-            positive=1,
-            tell=rubbing,
-        ),
+        *_hinges(rig, mass, block),
         Candidate(
             "air_drag",
             (added("air.drag_area", "m^2", 3.0 * size**2, block + place.DRAG_AREA),),
@@ -112,7 +76,6 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
             name_in_result="added_mass",
             everywhere=True,
         ),
-        *_air_plates(rig, size, block),
         _spinning_part(mass * size**2, block),
         _cable_mass(rig, block),
         *_cable_torsion(mass * rig.gravity, block),
@@ -138,34 +101,55 @@ def left_out_physics(rig: Rig, parameters: ParameterSet, mass: float) -> list[Ca
     return out
 
 
-def _air_plates(rig: Rig, size: float, block: int) -> list[Candidate]:
-    """Air against one flat side, facing about along each of the body's axes. size: m, of the rig."""
-    out = []
-    for axis, normal in (("x", (0.0, 0.0)), ("y", (0.5 * np.pi, 0.0)), ("z", (0.0, 0.5 * np.pi))):
-        area = added("air.plate_area", "m^2", 3.0 * size**2, block + place.AIR_PLATE)
-        angles = tuple(
-            added(f"air.plate_{name}", "rad", FACING, block + place.AIR_PLATE_NORMAL + i, normal[i])
-            for i, name in enumerate(("azimuth", "elevation"))
-        )
-        point = tuple(
-            added(
-                f"air_drag.point.{a}", "m", 0.3 * size, block + place.AIR_PLATE_POINT + i, middle_of(rig)[i]
-            )
-            for i, a in enumerate("xyz")
-        )
-        out.append(
-            Candidate(
-                "air_drag",
-                (area, *angles, *point),
-                f"The air resists at a flat side that faces {axis}, with the square of speed along that: a "
-                "drag area of {value}.",
-                "Keep speeds low, cover or take off what catches the air, or keep the drag in the model.",
-                {"channel": None, "axis": axis},
-                positive=1,
-                name_in_result="drag_area",
-            )
-        )
+def _hinges(rig: Rig, mass: float, block: int) -> list[Candidate]:
+    """Hinges that damp, and hinges that rub: of all cables alike, and of one cable alone."""
+    n = len(rig.cables)
+    length = float(np.mean([c.length for c in rig.cables]))
+    damping = 0.1 * mass * length * np.sqrt(rig.gravity * length) / (2 * n)
+    friction = 0.003 * mass * rig.gravity / n
+    creep = replace(added("hinge.creep", "rad/s", CREEP_SPREAD, block + place.CREEP, CREEP_RATE), ratio=True)
+    shared = (damping, block + place.DAMPING), (friction, block + place.FRICTION)
+    out = _hinges_of("hinge", None, *shared, creep)
+    for i, cable in enumerate(rig.cables):
+        o, own = layout.cable_offset(i), f"{cable.name}.hinge"
+        entries = (n * damping, o + layout.HINGE_DAMPING), (n * friction, o + layout.HINGE_FRICTION)
+        out += _hinges_of(own, cable.name, *entries, creep)
     return out
+
+
+def _hinges_of(
+    name: str, channel: str | None, damping: tuple[float, int], friction: tuple[float, int], creep: Parameter
+) -> list[Candidate]:
+    """Both of some cables. damping, friction: how much is plausible, and its entry in the physics."""
+    rubbing = added(f"{name}.friction", "N*m", *friction)
+
+    def told(found: Estimates) -> Told:
+        return {
+            "torque": (*found.of(rubbing.name), "N*m"),
+            "creep_rate": (*found.of(creep.name), "rad/s"),
+        }
+
+    whose = "The cables' hinges" if channel is None else "The hinges of {channel} alone"
+    return [
+        Candidate(
+            "hinge_damping",
+            (added(f"{name}.damping", "N*m*s/rad", *damping),),
+            f"{whose} damp the motion: each puts {{value}} against the rate at which it turns.",
+            "Use knife edges or ball joints, or keep the damping in the model.",
+            {"channel": channel, "axis": None},
+            positive=1,
+            name_in_result="damping",
+        ),
+        Candidate(
+            "hinge_friction",
+            (rubbing, creep),
+            f"{whose} rub: each holds against turning with {{value}}.",
+            "Grease or replace the hinges; dry friction spoils small motions most.",
+            {"channel": channel, "axis": None},
+            positive=1,
+            tell=told,
+        ),
+    ]
 
 
 def _spinning_part(inertia: float, block: int) -> Candidate:

@@ -4,9 +4,8 @@ Two families (model/effects/point_law.py): a spring along some line with a linea
 and a brake with a linear and a square part that may fade with distance. Between them they hold what hardens,
 softens, attracts, rubs and drags at one place, which is most of what hangs on or near a body unnoticed.
 
-A law's columns are no polynomials of its place, so places are tried on a grid that closes in, at the price of
-one pass of the linearised model each (response.py). A law has many numbers, and something of it bends to
-anything: it is told only where it leaves nothing in any run and the catalogue does not come near it.
+Where it acts is tried (place_scan.py). A law has many numbers, and something of it bends to anything: it is
+told only where it leaves nothing in any run and the catalogue does not come near it.
 """
 
 from __future__ import annotations
@@ -22,14 +21,10 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
-from rig_identification.estimate.solve import Evaluation, Problem, excess
-from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.findings import written
-from rig_identification.mismatch.places import travel_of
-from rig_identification.mismatch.response import whitened_response
+from rig_identification.mismatch.place_scan import Scales, followed
 from rig_identification.mismatch.riders import middle_of
-from rig_identification.mismatch.screen import Promise, free_without
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Motion, RigModel
@@ -39,13 +34,6 @@ from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Share of the weight that each part of a law is believed to come to at the body's largest travel or speed.
-FORCE = 0.1
-#: Places tried along each axis, the part of the rig's longest side that they reach from the middle, and by
-#: what they close in on the best, so many times.
-PLACES, REACH, CLOSER, ROUNDS = 3, 0.6, 0.5, 3
-#: Part of the best gain up to which a shape's places are looked at no closer.
-BEHIND = 0.5
 #: Lines along which a spring is tried at first: azimuth and elevation, rad.
 LINES = ((0.0, 0.0), (0.5 * np.pi, 0.0), (0.25 * np.pi, 0.0), (-0.25 * np.pi, 0.0), (0.0, 1.3))
 #: Widths of a brake's reach that are tried, in parts of the largest travel; 0: it does not fade.
@@ -67,27 +55,6 @@ ADVICE = (
     "No entry of the catalogue has it: look for what touches, pulls, attracts or brakes the body there, take "
     "it away, or keep the law in the model."
 )
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Sizes that belong to a session: force N, largest travel m and speed m/s of the body's middle."""
-
-    force: float
-    travel: float
-    speed: float
-    size: float  # m, the rig's longest side
-
-
-def scales_of(problem: Problem, evaluation: Evaluation, mass: float) -> Scales:
-    """Sizes about a fitted motion. mass: kg, roughly."""
-    rig, model = problem.bench.rig, problem.bench.parameters.model
-    at = middle_of(rig)
-    pairs = [_followed(model, run.motion, at) for run in evaluation.runs]
-    travel = max(float(np.max(np.linalg.norm(u, axis=1))) for u, _ in pairs)
-    speed = max(float(np.max(np.linalg.norm(v, axis=1))) for _, v in pairs)
-    size = float(np.max(extent(rig)))
-    return Scales(FORCE * mass * rig.gravity, max(travel, 1e-6), max(speed, 1e-6), size)
 
 
 def spring_law(rig: Rig, scales: Scales, line: tuple[float, float]) -> Candidate:
@@ -147,7 +114,7 @@ def _told(found: Estimates) -> Told:
 
 
 @dataclass(frozen=True)
-class Shape:
+class Law:
     """What is tried of a law at every place: a spring along a ``line``, or a brake that fades so fast."""
 
     line: tuple[float, float] | None
@@ -179,7 +146,7 @@ class Shape:
 
     def wrenches(self, model: RigModel, motion: Motion, at: Array, scales: Scales) -> Array:
         """(N, 6, parts) wrench about the datum, body axes, of a std of each part at the place ``at``."""
-        u, v = _followed(model, motion, at)
+        u, v = followed(model, motion, at)
         if self.line is not None:
             force = _pulls(u / scales.travel, *self.line)
         else:
@@ -189,8 +156,8 @@ class Shape:
         return np.concatenate([body, np.cross(at[None, :, None], body, axis=1)], axis=1)
 
 
-#: All that is tried at every place.
-SHAPES = (*(Shape(line) for line in LINES), *(Shape(None, narrow) for narrow in NARROWS))
+#: All laws that are tried at every place.
+LAWS = (*(Law(line) for line in LINES), *(Law(None, narrow) for narrow in NARROWS))
 
 
 def _direction(azimuth: float, elevation: float) -> Array:
@@ -210,87 +177,6 @@ def _brakes(u: Array, v: Array, narrow: float) -> Array:
     """(N, 3, 2) force of a unit of each part of a brake at travels ``u``, velocities ``v`` (N, 3), world."""
     fade = np.exp(-narrow * np.sum(u**2, axis=1))[:, None, None]
     return np.asarray(-fade * np.stack([v, np.linalg.norm(v, axis=1)[:, None] * v], axis=2))
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A shape's best place."""
-
-    gain: float  # nats
-    at: Array  # (3,) m
-    amounts: Array  # in units of their std
-
-
-def point_laws(problem: Problem, evaluation: Evaluation, mass: float) -> list[Promise]:
-    """What each shape promises at its best place, to first order, best first. mass: kg, roughly."""
-    rig, model = problem.bench.rig, problem.bench.parameters.model
-    scales = scales_of(problem, evaluation, mass)
-    base = free_without(problem, evaluation.point, evaluation, set(), 0)
-    beyond = Beyond(evaluation, base, problem.bench.parameters.size)
-    center, step = middle_of(rig), REACH * scales.size
-    best: dict[Shape, _Place] = {}
-    about = dict.fromkeys(SHAPES, center)
-    for _ in range(1 + ROUNDS):
-        for shape, found in _best_of(model, beyond, scales, about, step, center).items():
-            if shape not in best or found.gain > best[shape].gain:
-                best[shape] = found
-        # What is far behind needs no closer look
-        most = max((found.gain for found in best.values()), default=0.0)
-        about = {shape: found.at for shape, found in best.items() if found.gain > BEHIND * most}
-        step *= CLOSER
-    left = max(1.0, excess(evaluation))
-    out = []
-    for shape, found in best.items():
-        candidate = shape.candidate(rig, scales)
-        values = shape.values(candidate, found.at, found.amounts, scales)
-        out.append(Promise(candidate, found.gain, values, found.gain / left))
-    return sorted(out, key=lambda promise: -promise.gain)
-
-
-def _best_of(
-    model: RigModel,
-    beyond: Beyond,
-    scales: Scales,
-    about: dict[Shape, Array],
-    step: float,
-    center: Array,
-) -> dict[Shape, _Place]:
-    """Of each shape the best of the places ``about`` its own, ``step`` apart."""
-    line, reach = np.linspace(-step, step, PLACES), REACH * scales.size
-    offsets = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)
-    places = [
-        (shape, at)
-        for shape, p in about.items()
-        for at in np.clip(p + offsets, center - reach, center + reach)
-    ]
-    if not places:
-        return {}
-    runs = []
-    for run in beyond.full.runs:
-        wrenches = [shape.wrenches(model, run.motion, at, scales) for shape, at in places]
-        runs.append(whitened_response(run, np.concatenate(wrenches, axis=2), smooth=True))
-    found = beyond.of(runs)
-    out: dict[Shape, _Place] = {}
-    first = 0
-    for shape, at in places:
-        chosen = slice(first, first + len(shape.parts))
-        first = chosen.stop
-        part = found.part(chosen)
-        matrix = part.information([r[:, chosen] for r in runs]) + np.eye(len(shape.parts))
-        amounts = np.asarray(np.linalg.solve(matrix, part.right), dtype=np.float64)
-        away = float(np.sum((at - center) ** 2)) / scales.size**2
-        gain = 0.5 * float(part.right @ amounts) - 0.5 * away
-        if shape.makes_sense(amounts) and (shape not in out or gain > out[shape].gain):
-            out[shape] = _Place(gain, at, amounts)
-    return out
-
-
-def _followed(model: RigModel, motion: Motion, at: Array) -> tuple[Array, Array]:
-    """((N, 3) m, (N, 3) m/s) travel of the body's point ``at`` from where it hangs at rest, and velocity."""
-    x = motion.states
-    turning = np.cross(x[:, layout.RATE : layout.RATE + 3], at)
-    v = x[:, layout.VELOCITY : layout.VELOCITY + 3] + np.einsum("nij,nj->ni", motion.R_world_body, turning)
-    return travel_of(model, motion, at), np.asarray(v)
 
 
 #: Std of a point's coordinate, in parts of the rig's longest side, beyond which it is told as any.
@@ -361,6 +247,6 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
 def _force(model: RigModel, motion: Motion, at: Array) -> Array:
     """(N, 3) N, world: the law's force along a motion."""
     block = layout.effects_offset(model.cables)
-    p, (u, v) = model.physics[block:], _followed(model, motion, at)
+    p, (u, v) = model.physics[block:], followed(model, motion, at)
     pulls = _pulls(u, *p[place.LAW_DIRECTION :][:2]) @ p[place.LAW_SPRING :][:3]
     return np.asarray(pulls + _brakes(u, v, p[place.LAW_NARROW]) @ p[place.LAW_BRAKE :][:2])

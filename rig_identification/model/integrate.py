@@ -43,6 +43,7 @@ from rig_identification.model.layout import (
     CABLES,
     EXCITER_POSITION,
     GRAVITY,
+    HINGE_DAMPING,
     INERTIAL,
     LENGTH,
     OUT_ANGULAR_ACCELERATION,
@@ -156,7 +157,7 @@ def linearise(physics, modes, mount, reference, x, force, force_rate, z, inverse
             number = (d - CABLES) % CABLE_SIZE
             if number < own.shape[0]:
                 change[:] = own[number]
-            reached = hinged
+            reached = hinged or number >= HINGE_DAMPING
         if not reached:
             continue
         pc[d] = complex(physics[d], STEP)

@@ -14,7 +14,7 @@ EXCITER_POSITION = 13  # 3: m, body
 EXCITER_ROTATION = 16  # 3: rotation vector of exciter frame against its description, rad, body axes
 EXCITER_GAIN = 19  # 1: factor from measured to true force
 CABLES = 20  # first cable block
-CABLE_SIZE = 13
+CABLE_SIZE = 15
 CEILING_POINT = 0  # 3: m, world
 BODY_POINT = 3  # 3: m, body
 LENGTH = 6  # m
@@ -22,6 +22,8 @@ AXIAL_STIFFNESS = 7  # EA, N
 AXIAL_DAMPING = 8  # time constant tau of Kelvin-Voigt damping, s
 CELL_AT_CEILING = 9  # 1: the load cell sits at the ceiling end; 0: at the body
 LEAN = 10  # 3: N m/rad, xx, xy, yy: how its upper end holds the cable as it leans (effects/held_ends.py)
+HINGE_DAMPING = 13  # N m s/rad, of its own two hinges beside what all have (effects/hinge_damping.py)
+HINGE_FRICTION = 14  # N m, of its own two hinges beside what all have (effects/hinge_friction.py)
 
 # One internal coordinate (effects/internal.py); its block follows the effects' block
 KIND = 0  # constant: RIDER or CEILING

@@ -161,10 +161,12 @@ class Watcher:
                     continue
 
     def close(self) -> None:
-        """End the program and leave no file."""
+        """End the program and leave no file. Whoever calls :meth:`look` after it starts no other one."""
+        self.forget()
         self._end()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
 
 
 def _commands(rig: Rig, file: str) -> bytes:

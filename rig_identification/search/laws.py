@@ -12,17 +12,27 @@ from rig_identification.estimate.solve import POLISH, Problem, solve
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.point_laws import law_finding, parts_of, point_laws, sparser
+from rig_identification.mismatch.place_scan import best_places
+from rig_identification.mismatch.plates import PLATES
+from rig_identification.mismatch.point_laws import LAWS, law_finding, parts_of, sparser
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.trial import LAST_STEPS, Trial, in_stds, log_evidence, mass_of
 from rig_identification.search.ladder import Rung
 
 
 def promised_laws(rung: Rung, found: tuple[Candidate, ...]) -> list[Promise]:
-    """What laws promise about the motion of a model, best first; none where it has a law already."""
-    if any(parts_of(c) for c in found):
-        return []
-    return point_laws(rung.problem, rung.evaluation, mass_of(rung.problem, rung.evaluation))
+    """What laws, and named effects at a place, promise about the motion of a model, best first.
+
+    None of what it has already.
+    """
+    shapes = () if any(parts_of(c) for c in found) else LAWS
+    taken = {q.name for q in rung.problem.bench.parameters.free}
+    mass = mass_of(rung.problem, rung.evaluation)
+    return [
+        promise
+        for promise in best_places(rung.problem, rung.evaluation, mass, (*shapes, *PLATES))
+        if not taken & {q.name for q in promise.candidate.parameters}
+    ]
 
 
 def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:

@@ -50,7 +50,16 @@ from rig_identification.model.effects.point_law import add_point_law
 from rig_identification.model.effects.spinning_part import add_spinning_part
 from rig_identification.model.effects.tether import add_tether
 from rig_identification.model.effects.turning_cube import add_turning_cube
-from rig_identification.model.layout import BODY_STATE, CABLE_SIZE, CABLES, CEILING, INTERNAL_SIZE, KIND
+from rig_identification.model.layout import (
+    BODY_STATE,
+    CABLE_SIZE,
+    CABLES,
+    CEILING,
+    HINGE_DAMPING,
+    HINGE_FRICTION,
+    INTERNAL_SIZE,
+    KIND,
+)
 
 
 @njit(cache=True)
@@ -76,6 +85,7 @@ def effects_reach(physics, modes, internal):  # type: ignore[no-untyped-def]
     hinges = active(physics[block + DAMPING]) or active(physics[block + FRICTION])
     hinges = hinges or _any_active(physics, block + BENDING, 2) or active(physics[block + ROLL_STIFFNESS])
     hinges = hinges or _any_active(physics, block + TORSION, 4) or active(physics[block + LEANING])
+    hinges = hinges or _hinges_of_any(physics, (0, modes.shape[0]))
     return body, rotor or rods or _riders(physics, modes, internal), rotor, rods or hinges
 
 
@@ -89,7 +99,8 @@ def effects_follow(physics, modes, internal):  # type: ignore[no-untyped-def]
     block = CABLES + CABLE_SIZE * modes.shape[0]
     if physics.shape[0] <= block:
         return False, False
-    place, turn = False, _riders(physics, modes, internal)
+    hinges = _hinges_of_any(physics, (0, modes.shape[0]))
+    place, turn = hinges, hinges or _riders(physics, modes, internal)
     for i in range(TETHER_POINT):
         if active(physics[block + i]):
             turn = True
@@ -152,9 +163,10 @@ def add_effects_at(physics, modes, cable, x, R, K, r):  # type: ignore[no-untype
 @njit(cache=True)
 def _add_at_cables(physics, block, modes, cables, x, R, K, r):  # type: ignore[no-untyped-def]
     """Add what acts at some cables, first to last but one; at all where one cable's share asks for all."""
-    if active(physics[block + DAMPING]):
+    own = _hinges_of_any(physics, cables)
+    if own or active(physics[block + DAMPING]):
         add_hinge_damping(physics, block, modes, cables, x, R, r)
-    if active(physics[block + FRICTION]):
+    if own or active(physics[block + FRICTION]):
         add_hinge_friction(physics, block, modes, cables, x, R, r)
     if _any_active(physics, block + BENDING, 2):
         add_hinge_bending(physics, block, modes, cables, x, R, r)
@@ -166,6 +178,16 @@ def _add_at_cables(physics, block, modes, cables, x, R, K, r):  # type: ignore[n
         add_held_ends(physics, block, modes, cables, x, R, r)
     if active(physics[block + LINEAR_DENSITY]):
         add_cable_mass(physics, block, modes, cables, x, R, K, r)
+
+
+@njit(cache=True, inline="always")
+def _hinges_of_any(physics, cables):  # type: ignore[no-untyped-def]
+    """Whether any of some cables, first to last but one, has a moment in its hinges of its own."""
+    found = False
+    for i in range(cables[0], cables[1]):
+        first = CABLES + CABLE_SIZE * i
+        found = found or active(physics[first + HINGE_DAMPING]) or active(physics[first + HINGE_FRICTION])
+    return found
 
 
 @njit(cache=True, inline="always")

@@ -1,4 +1,7 @@
-"""A Coulomb moment in the cables' hinges: of fixed size, against the relative rotation there."""
+"""A Coulomb moment in the cables' hinges: of fixed size, against the relative rotation there.
+
+Each cable may have one of its own beside what all have.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,17 @@ from numba import njit
 
 from rig_identification.model.effects.hinges import add_hinge_moments
 from rig_identification.model.effects.place import CREEP, FRICTION, active
+from rig_identification.model.layout import CABLE_SIZE, CABLES, HINGE_FRICTION
 
 
 @njit(cache=True)
 def add_hinge_friction(physics, block, modes, cables, x, R, r):  # type: ignore[no-untyped-def]
     """Add the force and moment of some cables' rubbing hinges to r."""
-    torque = physics[block + FRICTION]
+    torque, creep = physics[block + FRICTION], physics[block + CREEP]
+    none = 0.0 * torque
     if active(torque):
-        none = 0.0 * torque
-        add_hinge_moments(physics, modes, cables, x, R, (none, none), torque, physics[block + CREEP], 1.0, r)
+        add_hinge_moments(physics, modes, cables, x, R, (none, none), torque, creep, 1.0, r)
+    for i in range(cables[0], cables[1]):
+        own = physics[CABLES + CABLE_SIZE * i + HINGE_FRICTION]
+        if active(own):
+            add_hinge_moments(physics, modes, (i, i + 1), x, R, (none, none), own, creep, 1.0, r)

@@ -49,15 +49,16 @@ def test_a_rotor_neither_drives_nor_brakes_a_body_on_its_cables() -> None:
 
 
 def test_a_plate_takes_out_what_air_against_it_does() -> None:
-    """Its power is -1/2 rho A |u|^3 at its place, u along its normal: x here."""
+    """Its power is -1/2 rho A sqrt(u^2 + s^2 w^2) u^2 at its place, u along its normal, x here, w across."""
     sample, at = random_sample(3, 3), np.array([0.4, 0.9, -0.3])
     plain = sample.model()
     state = moving(sample, plain, 3)
-    air = {"AIR_PLATE": 8.0, "AIR_PLATE_NORMAL": np.zeros(2), "AIR_PLATE_POINT": at}
+    along = 0.6
+    air = {"AIR_PLATE": 8.0, "AIR_PLATE_NORMAL": np.zeros(2), "AIR_PLATE_POINT": at, "AIR_PLATE_ALONG": along}
     motion = simulate(having(plain, **air), state, Input.none(401, 0.0025))
     velocity = np.einsum("nji,nj->ni", motion.R_world_body, motion.states[:, 6:9])
-    u = (velocity + np.cross(motion.states[:, 9:12], at))[:, 0]
-    power = 0.5 * 1.2 * 8.0 * np.abs(u) ** 3
+    u, *across = (velocity + np.cross(motion.states[:, 9:12], at)).T
+    power = 0.5 * 1.2 * 8.0 * np.sqrt(u**2 + along**2 * (across[0] ** 2 + across[1] ** 2)) * u**2
     kinetic, potential = kinetic_and_potential(plain, motion)
     lost = (kinetic + potential)[0] - (kinetic + potential)[-1]
     assert lost == pytest.approx(np.trapezoid(power, dx=0.0025), rel=1e-3)
@@ -67,10 +68,40 @@ def test_a_plate_takes_out_what_air_against_it_does() -> None:
 def test_every_number_of_both(seed: int) -> None:
     sample = random_sample(seed, 3)
     air = {"AIR_PLATE": 3.0, "AIR_PLATE_NORMAL": np.array([0.4, 0.3]), "AIR_PLATE_POINT": np.full(3, 0.2)}
+    air["AIR_PLATE_ALONG"] = np.array([0.6])
     model = having(sample.model(rods=True), SPIN=0.1 * H, **air)
     block = layout.effects_offset(model.cables)
     entries = [block + place.SPIN + i for i in range(3)]
     entries += [block + place.AIR_PLATE, *(block + place.AIR_PLATE_NORMAL + i for i in range(2))]
-    entries += [block + place.AIR_PLATE_POINT + i for i in range(3)]
+    entries += [block + place.AIR_PLATE_ALONG, *(block + place.AIR_PLATE_POINT + i for i in range(3))]
     entries += [layout.INERTIAL + 4, layout.CABLES + layout.LENGTH]
     check_physics(model, moving(sample, model, seed), drive_of(61, 0.01, seed), entries, 5e-6)
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_hinges_of_one_cable(seed: int) -> None:
+    sample = random_sample(seed, 3)
+    model = sample.model(rods=True)
+    block, one = layout.effects_offset(model.cables), layout.cable_offset(1)
+    physics = model.physics.copy()
+    physics[block + place.DAMPING], physics[block + place.CREEP] = 0.3, 0.1
+    physics[one + layout.HINGE_DAMPING], physics[one + layout.HINGE_FRICTION] = 2.0, 1.0
+    entries = [one + layout.HINGE_DAMPING, one + layout.HINGE_FRICTION, one + layout.BODY_POINT]
+    entries += [layout.cable_offset(0) + layout.HINGE_DAMPING, block + place.CREEP, layout.INERTIAL + 4]
+    own = model.with_physics(physics)
+    check_physics(own, moving(sample, own, seed), drive_of(61, 0.01, seed), entries, 5e-6)
+
+
+@pytest.mark.parametrize("kind", ["DAMPING", "FRICTION"])
+def test_as_much_in_each_cable_as_in_all(kind: str) -> None:
+    sample = random_sample(3, 4)
+    plain = sample.model(rods=True)
+    state = moving(sample, plain, 3)
+    all_alike = having(plain, **{kind: 1.5, "CREEP": 0.05})
+    each = having(plain, CREEP=0.05)
+    for i in range(4):
+        each.physics[layout.cable_offset(i) + getattr(layout, f"HINGE_{kind}")] = 1.5
+    still = Input.none(101, 0.01)
+    one, other = simulate(all_alike, state, still), simulate(each, state, still)
+    assert np.ptp(simulate(plain, state, still).states - one.states) > 1e-3
+    np.testing.assert_allclose(one.states, other.states, atol=1e-9)
