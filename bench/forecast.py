@@ -2,10 +2,11 @@
 
 Each run is simulated with noise and with a rig that is not quite as described, and shaken in a way of its
 own after it was pulled aside and let go. The ideal model is fitted to its first quarter. What a fit to the
-whole run would tell is forecast twice: with the exciter's force as planned, and as it was last, repeated.
-Both are set beside the std that a fit to the whole run then states. Rigs: case studies 1, 10 and 14 of the
-thesis and three inclined cables. Runs go to a log as they are done; a second call goes on where the first
-stopped.
+whole run would tell is forecast three times: with the exciter's force as it will be, as the live graph takes
+it from a file of commands whose beginning it has to find, and as it was last, repeated. The file has 50 lines
+a second, as a plan's, and began up to three seconds before the recording. All are set beside the std that a
+fit to the whole run then states. Rigs: case studies 1, 10 and 14 of the thesis and three inclined cables.
+Runs go to a log as they are done; a second call goes on where the first stopped.
 
     python -m bench.forecast [--runs 20] [--seconds 20]
 """
@@ -13,6 +14,7 @@ stopped.
 from __future__ import annotations
 
 import argparse
+import tempfile
 import time
 from dataclasses import replace
 from functools import partial
@@ -28,16 +30,20 @@ from rig_identification import watch
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.observability import inertial_estimate
+from rig_identification.session.exciter_commands import HEAD, read_commands
 from rig_identification.simulate import RunSpec, SampleRates, SessionSpec, simulate_session
 from rig_identification.simulate.exciter import ForceProgram, Multisine, UnbalancedMass
 from rig_identification.simulate.start import Pulled
 from rig_identification.watch.forecast import forecast
-from rig_identification.watch.part import so_far
+from rig_identification.watch.part import Force, so_far
+from rig_identification.watch.planned import Begun, begun
 
 HERE = Path(__file__).parent
 RATES = SampleRates(tension=100.0, exciter=200.0, shaft=0.0, imu=100.0, inclinometer=50.0, ground_truth=0.0)
 #: Share of the run after which it is forecast.
 EARLY = 0.25
+#: s before the recording at which the exciter was told to begin, at most.
+BEFORE = 3.0
 
 
 def drawn(geometry: str, seconds: float, rng: np.random.Generator) -> tuple[SessionSpec, ForceProgram]:
@@ -66,9 +72,11 @@ def one_run(code: str, geometry: str, number: int, seconds: float) -> Entry:
     whole = fit_session(session)
     final = _std(whole)
     early = fit_session(so_far(session, EARLY * seconds))
-    begun = time.perf_counter()
-    made = {how: forecast(early, "run_1", seconds, force if how == "planned" else None) for how in HOW}
-    took = (time.perf_counter() - begun) / len(HOW)
+    found = commanded(force, seconds, early, np.random.default_rng([3, number]))
+    forces: dict[str, Force | None] = {"planned": force, "commanded": found, "repeated": None}
+    started = time.perf_counter()
+    made = {how: forecast(early, "run_1", seconds, forces[how]) for how in HOW}
+    took = (time.perf_counter() - started) / len(HOW)
     return {
         "rig": geometry,
         "number": number,
@@ -78,10 +86,27 @@ def one_run(code: str, geometry: str, number: int, seconds: float) -> Entry:
         "least_tension": min(truth.least_tension.values()),
         "converged": whole.converged and early.converged,
         "seconds": took,
+        "found": found is not None,
         "std_early": _std(early).tolist(),
         "std_final": final.tolist(),
         "ratio": {how: None if f is None else (f.std[-1] / final).tolist() for how, f in made.items()},
     }
+
+
+def commanded(force: ForceProgram, seconds: float, early: Fitted, rng: np.random.Generator) -> Begun | None:
+    """The force as a file of commands tells it, found in what was measured; None: not found, so repeated."""
+    before = float(rng.uniform(0.0, BEFORE))
+    at = np.arange(0.0, seconds + BEFORE, 0.02)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "exciter.csv"
+        rows = [
+            f"shake,{t:.2f},,,{x:.5g},{y:.5g},{z:.5g}"
+            for t, (x, y, z) in zip(at, force(at - before), strict=True)
+        ]
+        file.write_text("\n".join([",".join(HEAD), *rows]) + "\n", encoding="utf-8")
+        plans = read_commands(file)
+    measured = early.problem.runs[-1].recording.exciter_force
+    return None if measured is None else begun(measured, plans, "run_1")
 
 
 def _std(fitted: Fitted) -> np.ndarray:
@@ -97,7 +122,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     chosen = parser.parse_args()
     here = Path(watch.__file__).parent
-    code = fingerprint(Path(__file__), here / "part.py", here / "forecast.py")
+    code = fingerprint(Path(__file__), here / "part.py", here / "forecast.py", here / "planned.py")
     jobs = [(GEOMETRIES[k % len(GEOMETRIES)], k, chosen.seconds) for k in range(chosen.runs)]
 
     def job_of(entry: Entry) -> tuple[Any, ...]:

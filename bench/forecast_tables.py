@@ -9,7 +9,8 @@ import numpy as np
 
 #: How near a forecast is to come.
 NEAR = 0.2
-HOW = ("planned", "repeated")
+HOW = ("planned", "commanded", "repeated")
+COLOURS = ("#1f5fa8", "#2a8a4a", "#d08020")
 
 
 def report(runs: Sequence[dict[str, Any]]) -> str:
@@ -36,21 +37,26 @@ def report(runs: Sequence[dict[str, Any]]) -> str:
             f"| {how} | {near.sum()} of {near.size} ({100 * near.mean():.1f} %) | {whole} of {len(runs)} "
             f"| {low:.2f} to {high:.2f} | {len(runs) - len(there)} |"
         )
+    missed = sum(not r["found"] for r in runs)
     shrunk = np.concatenate([np.array(r["std_early"]) / np.array(r["std_final"]) for r in runs])
     low, middle, high = np.percentile(shrunk, [5, 50, 95])
     lines += [
+        "",
+        "*Planned*: the true force. *Commanded*: what the live graph makes of a plan's `exciter.csv`, whose "
+        "beginning it finds in the measured force. "
+        f"Not found in {missed} runs, which are forecast as repeated.",
         "",
         f"What was to be foreseen: after a quarter the std is {middle:.2f} times the final one in the "
         f"median, {low:.2f} to {high:.2f} from 5 to 95 %.",
         f"A forecast takes {np.median([r['seconds'] for r in runs]):.1f} s in the median.",
         "",
-        "| rig | runs | planned: worst ratio | repeated: worst ratio |",
-        "| --- | --- | --- | --- |",
+        f"| rig | runs | {' | '.join(f'{how}: worst ratio' for how in HOW)} |",
+        f"| --- | --- |{' --- |' * len(HOW)}",
     ]
     for rig in sorted({r["rig"] for r in runs}):
         mine = [r for r in runs if r["rig"] == rig]
         worst = [_worst(np.concatenate([r["ratio"][how] for r in mine if r["ratio"][how]])) for how in HOW]
-        lines.append(f"| {rig} | {len(mine)} | {worst[0]:.2f} | {worst[1]:.2f} |")
+        lines.append(f"| {rig} | {len(mine)} | {' | '.join(f'{w:.2f}' for w in worst)} |")
     return "\n".join([*lines, "", f"Fingerprint of the code: {runs[0]['code']}", ""])
 
 
@@ -79,7 +85,7 @@ def figure(runs: Sequence[dict[str, Any]]) -> str:
             f'<line x1="{left}" x2="{width}" y1="{y(tick):.1f}" y2="{y(tick):.1f}" stroke="#ccc"/>'
         )
     for k, run in enumerate(runs):
-        for how, shift, fill in (("planned", 10, "#1f5fa8"), ("repeated", 20, "#d08020")):
+        for how, shift, fill in zip(HOW, (7, 15, 23), COLOURS, strict=True):
             for ratio in run["ratio"][how] or ():
                 x = left + 30 * k + shift
                 parts.append(
@@ -87,7 +93,7 @@ def figure(runs: Sequence[dict[str, Any]]) -> str:
                 )
     parts.append(
         f'<text x="{left}" y="{height - 10}">forecast / final std of the ten numbers, run by run: '
-        '<tspan fill="#1f5fa8">force as planned</tspan>, <tspan fill="#d08020">force repeated</tspan>; '
-        "band: 20 %</text></svg>"
+        + ", ".join(f'<tspan fill="{c}">force {how}</tspan>' for how, c in zip(HOW, COLOURS, strict=True))
+        + "; band: 20 %</text></svg>"
     )
     return "\n".join(parts) + "\n"

@@ -5,8 +5,8 @@ Whoever records hands on all that came so far, again and again; each time costs 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig_identification.errors import InputError
 from rig_identification.identification import fault_text, prepare
 from rig_identification.raw import RawSession
-from rig_identification.recording import Session
+from rig_identification.recording import Series, Session
 from rig_identification.result import InertialEstimate
 
 Array = NDArray[np.float64]
@@ -31,6 +31,9 @@ class Expected:
 
     seconds: float = 60.0  # planned length of the run
     aim: float = 0.01  # share of its natural size to which each element of J is to be known, 95 % half-width
+    #: Planned force by run, s after the exciter's start and N in its frame. Where none is carried out, the
+    #: measured force is taken to repeat itself.
+    forces: Mapping[str, Series] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,8 @@ class Watched:
     cause: str = ""  # short name of what explains the motion
     parameters: dict[str, dict[str, object]] | None = None  # of the finding: name -> value, std, unit
     estimate: InertialEstimate | None = None
-    forecast: dict[str, object] | None = None  # seconds, share, std by length; aim; enough: s or None
+    #: seconds, share, std by length; aim; enough: s or None; force: "planned" or "repeated"
+    forecast: dict[str, object] | None = None
 
 
 class Watching:
@@ -100,19 +104,22 @@ class Watching:
             )  # fmt: skip
         self._before = found
         if whole and found.verdict == "none":
-            self._forecast = self._foreseen(found, name)
+            self._forecast = self._foreseen(found, session, name)
         finding = found.finding
         return Watched(
             name, run.duration, faults, found.verdict, found.text, found.error, found.cause,
             None if finding is None else finding.parameters, found.estimate, self._forecast,
         )  # fmt: skip
 
-    def _foreseen(self, found: object, name: str) -> dict[str, object] | None:
+    def _foreseen(self, found: object, session: Session, name: str) -> dict[str, object] | None:
         from rig_identification.watch.forecast import forecast
         from rig_identification.watch.look import Look
+        from rig_identification.watch.planned import begun
 
         assert isinstance(found, Look)
-        made = forecast(found.fitted, name, self.expected.seconds)
+        measured = session.recordings[-1].exciter_force
+        force = None if measured is None else begun(measured, self.expected.forces, name)
+        made = forecast(found.fitted, name, self.expected.seconds, force)
         if made is None:
             return self._forecast
         return {
@@ -121,4 +128,5 @@ class Watching:
             "std": made.std.tolist(),
             "aim": self.expected.aim,
             "enough": made.enough(self.expected.aim),
+            "force": "repeated" if force is None else "planned",
         }

@@ -73,7 +73,13 @@ def look() -> dict[str, object]:
                 "std": [[std, 3.0, 4.0], [3.0, std, 5.0], [4.0, 5.0, std]],
             },
         },
-        "forecast": {"seconds": [6.0, 18.0, 60.0], "share": [0.04, 0.02, 0.008], "aim": 0.01, "enough": 47.0},
+        "forecast": {
+            "seconds": [6.0, 18.0, 60.0],
+            "share": [0.04, 0.02, 0.008],
+            "aim": 0.01,
+            "enough": 47.0,
+            "force": "planned",
+        },
     }
 
 

@@ -494,3 +494,24 @@ def test_coarse_steps_of_two_axes_of_one_channel_are_each_kept_half_way() -> Non
 @pytest.mark.parametrize("step", [0.0, 1.0, 2.0, 3.0])
 def test_steps_that_noise_spreads_over_are_no_fault(step: float) -> None:
     assert coarse_steps.find(make_raw(step=step * NOISE)) == ()
+
+
+def test_numbers_that_no_device_measures_are_not_computed_with() -> None:
+    """Damaged bytes read as a number: the message counts as one in which nothing was measured."""
+
+    def damaged(values: np.ndarray) -> np.ndarray:
+        values[100:103, 0] = 1e308, -np.inf, 2e12
+        return values
+
+    def unmeasured(values: np.ndarray) -> np.ndarray:
+        values[100:103] = np.nan
+        return values
+
+    raw = make_raw(seconds=1.5)
+    found, expected = (examine(changed(raw, "imu", change)) for change in (damaged, unmeasured))
+    assert found.examination.faults == expected.examination.faults
+    for one, other in zip(found.session.recordings, expected.session.recordings, strict=True):
+        ours, theirs = one.channel("imu"), other.channel("imu")
+        assert ours is not None
+        assert theirs is not None
+        assert np.array_equal(ours.values, theirs.values, equal_nan=True)

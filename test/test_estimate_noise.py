@@ -68,3 +68,9 @@ def test_a_noise_that_is_not_described_is_found_at_any_rate(rate: int) -> None:
     std, estimated = noise_std(replace(make_rig(), noise={}), "tension", time, values)
     assert std[0] == pytest.approx(1.0, rel=0.15)
     assert estimated
+
+
+@pytest.mark.parametrize("count", [1, 2, 127, 300])
+def test_few_samples_have_no_floor(count: int) -> None:
+    values = np.random.default_rng(0).standard_normal((count, 3))
+    assert white_floor(np.arange(count) / 100.0, values).tolist() == [0.0, 0.0, 0.0]

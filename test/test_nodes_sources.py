@@ -9,7 +9,9 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +19,16 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 pytest.importorskip("serial", reason="pyserial is not installed: pip install '.[ros]'")
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from node_processes import Diagnostics, Graph, Probe, graph_of_the_test, probe_of_the_test  # noqa: F401
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from node_processes import (  # noqa: F401
+    ACQUAINTED,
+    Diagnostics,
+    Graph,
+    Probe,
+    graph_of_the_test,
+    probe_of_the_test,
+)
 
 from rig_identification.session import read_session
 
@@ -80,6 +91,71 @@ def test_a_serial_amplifier_is_read_unplugged_and_plugged_in_again(graph: Graph,
     amplifier.unplug()
 
 
+def asking(probe: Probe, kind: Any, service: str) -> Callable[[Any], Any]:
+    """Asks a service of any type for its answer."""
+    client = probe.node.create_client(kind, service)
+    probe.spin_until(client.service_is_ready, 120.0, service)
+    probe.spin_for(ACQUAINTED)
+
+    def ask(request: Any) -> Any:
+        future = client.call_async(request)
+        probe.spin_until(future.done, 20.0, f"answer of {service}")
+        return future.result()
+
+    return ask
+
+
+def test_a_lifecycle_manager_opens_starts_and_stops_a_sensor(graph: Graph, probe: Probe) -> None:
+    port = graph.folder / "ttyUSB0"
+    node = graph.start("inclinometer", "autostart:=false", "source:=serial", f"serial.port:={port}")
+    angles = probe.listen(Vector3Stamped, "inclinometer/angles")
+
+    get = asking(probe, GetState, "inclinometer/get_state")
+    set_to = asking(probe, ChangeState, "inclinometer/change_state")
+
+    def state() -> str:
+        return str(get(GetState.Request()).current_state.label)
+
+    def change(label: str = "", number: int = 0) -> bool:
+        return bool(set_to(ChangeState.Request(transition=Transition(id=number, label=label))).success)
+
+    def opened() -> bool:
+        return any("/pts/" in os.readlink(file) for file in Path(f"/proc/{node.pid}/fd").iterdir())
+
+    assert not change("configure")  # there is no port
+    assert state() == "unconfigured"
+    amplifier = Amplifier(port, b"0.25,-0.5\r\n")
+    assert not change("activate")  # not from here
+    assert not change(number=Transition.TRANSITION_ACTIVATE)
+    assert not opened()
+    assert probe.node.count_publishers("/rig/inclinometer/angles") == 0
+    assert change("configure")
+    assert state() == "inactive"
+    assert opened()
+    probe.spin_until(lambda: probe.node.count_publishers("/rig/inclinometer/angles"), 20.0, "its topic")
+    probe.spin_for(0.5)
+    assert not angles
+    assert change("activate")
+    begun = time.time_ns()
+    probe.spin_until(lambda: len(angles) > 20, 20.0, "samples")
+    first = angles[0].header.stamp
+    assert first.sec * 10**9 + first.nanosec > begun - 2e9  # what came before is not sent later
+    assert angles[0].vector.x == 0.25
+    assert change("deactivate")
+    probe.spin_for(0.3)
+    count = len(angles)
+    probe.spin_for(0.3)
+    assert len(angles) == count
+    assert change("cleanup")
+    assert not opened()
+    assert state() == "unconfigured"
+    status, output = graph.end(node)
+    assert status == 0
+    assert "plug the device in" in output
+    assert "Traceback" not in output
+    amplifier.unplug()
+
+
 def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> None:
     file = graph.folder / "logger.csv"
     rows = [f"{1000 + 20 * k},{0.001 * k},{-0.002 * k}" for k in range(750)]
@@ -91,6 +167,8 @@ def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> No
     )  # fmt: skip
     # Long enough to be met while it plays, however late the two find each other
     probe.spin_until(lambda: len(angles) > 10, 120.0, "some of the file's lines")
+    told = asking(probe, GetState, "inclinometer/get_state")(GetState.Request())
+    assert told.current_state.label == "active"  # without anybody's doing
     probe.spin_until(lambda: angles[-1].vector.x > 0.7485, 25.0, "the file's last line")
     now = time.time_ns()
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in angles]
@@ -115,6 +193,7 @@ def test_a_loggers_file_is_played_in_real_time(graph: Graph, probe: Probe) -> No
         ("rig_simulator", "effect.air_drag:=-3.0", "parameter effect.air_drag: -3.0 m^2 is not within"),
         ("rig_simulator", "body.inertia:=[1.0, 0.0, 0.0, 1.0, 0.0, 900.0]", "no body has"),
         ("replay", "session:=/nowhere", "/nowhere: session does not exist"),
+        ("identifier", "planned_force:=/nowhere.csv", "parameter planned_force: /nowhere.csv: No such file"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused_by_name(graph: Graph, name: str, parameter: str, words: str) -> None:

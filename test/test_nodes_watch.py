@@ -74,6 +74,21 @@ def test_what_a_window_holds_is_read_as_it_came(tmp_path: Path) -> None:
     assert motion.counts["/rig/imu/data_raw"] == motion.channels[1].stamp_ns.size
 
 
+def test_the_program_that_watches_takes_a_planned_force(tmp_path: Path) -> None:
+    """It ends with its input; a file that holds no commands is refused before."""
+    rig, commands = tmp_path / "rig.yaml", tmp_path / "exciter.csv"
+    rig.write_text(RIG)
+    run = [sys.executable, "-m", "rig_identification.nodes.watch_program", str(rig), "60", "0.01", "/rig"]
+
+    def ended() -> subprocess.CompletedProcess[str]:
+        return subprocess.run([*run, str(commands)], input="", capture_output=True, text=True, check=False)
+
+    commands.write_text("recording,time_s,force_x_N,force_y_N,force_z_N\nrun_1,0,1,2,3\nrun_1,0.02,1,2,3\n")
+    assert (ended().returncode, ended().stdout) == (0, "")
+    commands.write_text("nothing\n")
+    assert "column recording is missing" in ended().stderr
+
+
 #: An identifier whose window is long enough to be looked at ends, and works off what had come in by then.
 ENDED = """\
 import sys, tempfile
@@ -126,7 +141,9 @@ def test_a_cell_that_reads_high_is_told_while_the_window_is_open(graph: Graph, p
     graph.start("imu", "simulation.rate:=200.0")
     graph.start("inclinometer", "simulation.rate:=50.0")
     graph.start("tracker", "marker_rate:=0.0", "tf_rate:=0.0")
-    graph.start("identifier", "planned_seconds:=40.0")
+    commands = graph.folder / "exciter.csv"
+    commands.write_text("recording,time_s,force_x_N,force_y_N,force_z_N\nrun_1,0,1,2,3\nrun_1,0.02,1,2,3\n")
+    graph.start("identifier", "planned_seconds:=40.0", f"planned_force:={commands}")
     lines = Diagnostics(probe)
     heard = probe.listen(String, "identifier/watch", LATCHED)
     probe.spin_until(lines.arrivals("identifier", 50, "cable_1/wrench", "imu/data_raw"), 120.0, "samples")

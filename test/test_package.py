@@ -54,7 +54,7 @@ ALLOWED = {
     "batch": {"session"},
     "logs": {"session"},
     "plan": CORE | {"thesis", "simulate"},
-    "plan_report": CORE | {"plan", "simulate", "report"},
+    "plan_report": CORE | {"plan", "simulate", "report", "session"},
     "report": CORE | {"several"},
     "live": {"model", "statics", "estimate"},
     "watch": {"model", "estimate", "mismatch"},

@@ -151,6 +151,7 @@ def test_the_live_page_shows_it_all(width: int, client: Client) -> None:
         page.locator("#tensions .bar").nth(2).get_by_text("88.13 N").wait_for()
         page.locator("#inertia .u-over").wait_for()
         page.locator("#forecast .u-over").wait_for()
+        assert "follow its plan" in page.locator("#forecast .text").inner_text()
         assert "1108 ± 16" in page.locator("#inertia table").inner_text()
         page.locator(".scene canvas").scroll_into_view_if_needed()
         page.wait_for_function(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -259,3 +260,17 @@ def test_a_hostile_result_in_the_folder_is_a_line(client: Client) -> None:
         page = client.ask("/history").text
         assert "Not read" in page
         assert client.ask("/").status == 200
+
+
+def test_a_pipe_in_the_folder_is_no_description(tmp_path: Path) -> None:
+    """Reading one waits for ever."""
+    import os
+
+    for name in ("rig.yaml", "other.yaml", "session.yaml", "result.json"):
+        os.mkfifo(tmp_path / name)
+    (tmp_path / "zero.yaml").symlink_to("/dev/zero")
+    (tmp_path / "true.yaml").write_text("/**:\n  ros__parameters:\n    cables: [a]\n")
+    (tmp_path / "again.yaml").symlink_to("true.yaml")
+    folder = Folder(tmp_path.resolve())
+    assert folder.rigs() == ["again.yaml", "true.yaml"]
+    assert folder.sessions() == folder.results() == []

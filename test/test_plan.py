@@ -34,6 +34,7 @@ from rig_identification.plan.planning import session_of
 from rig_identification.plan_report import plan_document, render_plan, session_text, write_commands
 from rig_identification.result import ELEMENTS
 from rig_identification.rig import Cable, Mount, Rig
+from rig_identification.session.exciter_commands import read_commands
 from rig_identification.session.session_description import read_session_description
 from rig_identification.simulate import (
     Multisine,
@@ -267,6 +268,9 @@ def test_the_exciters_commands_are_its_force(planned: Plan, tmp_path: Path) -> N
     force = release().run.force(np.array([1.0]))  # type: ignore[union-attr]
     assert float(rows[50]["force_x_N"]) == pytest.approx(force[0, 0], rel=1e-3)
     assert float(rows[-1]["speed_hz"]) == pytest.approx(0.8)
+    (read,) = read_commands(tmp_path / "exciter.csv").values()
+    assert read.time == pytest.approx(np.arange(100) / 50.0)
+    assert read.values == pytest.approx(release().run.force(read.time), rel=1e-3, abs=1e-3)  # type: ignore[union-attr]
 
 
 def test_what_cannot_be_planned_is_refused(rig: Rig) -> None:

@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 from hostile_files import IDLE, RIG, TEXTS, WANTED, chunk, mcap, message, topic, write_session
 
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, MissingDescription
 from rig_identification.session.bag import read_bag
 from rig_identification.session.bag_metadata import read_bag_metadata
 from rig_identification.session.contents import MOST_TOPICS
 from rig_identification.session.fields import load_fields
+from rig_identification.session.read import read_raw
 from rig_identification.session.rig_description import read_rig
 from rig_identification.session.session_description import read_session_description
 from rig_identification.session.yaml_text import DEEPEST, MOST_NODES, TooMuch, load_yaml
@@ -27,7 +28,7 @@ READ_ALL = """
 import json, resource, sys, time
 from pathlib import Path
 import hostile_files
-from rig_identification.errors import InputError
+from rig_identification.errors import InputError, MissingDescription
 from rig_identification.session.read import read_raw
 
 out = {}
@@ -100,6 +101,21 @@ def test_a_pipe_is_no_description(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "rig.yaml")
     with pytest.raises(InputError, match="device or a pipe"):
         load_fields(tmp_path / "rig.yaml", "rig description")
+
+
+def test_what_is_no_file_beside_bags_is_passed_over(tmp_path: Path) -> None:
+    """A proposal looks for the rig description among all that may be one."""
+    import os
+
+    folder = write_session(tmp_path / "s", "run.mcap", mcap(chunk(topic(1, WANTED))))
+    (folder / "session.yaml").unlink()
+    os.mkfifo(folder / "a.yaml")
+    (folder / "b.yaml").symlink_to("b.yaml")
+    (folder / "c.yml").symlink_to("/dev/zero")
+    (folder / "d.yaml").mkdir()
+    with pytest.raises(MissingDescription) as told:
+        read_raw(folder)
+    assert "rig: rig.yaml\n" in told.value.proposal
 
 
 def test_what_people_write_is_within_the_limits() -> None:

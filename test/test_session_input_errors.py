@@ -75,6 +75,7 @@ RIG_FAULTS = [
     (put("gravity", value=True), "gravity: True is not a number"),
     (put("mass", value=0.0), "mass: 0 kg must be above 0"),
     (put("mass", value=NAN), "mass: nan is not finite"),
+    (put("mass", value=10**400), r"mass: 10+\.\.\.0+ is not finite"),
     (put("mass_std", value=0.0), "mass_std: 0 kg must be above 0"),
     (drop("cables"), "cables: missing"),
     (put("cables", value="cable_1"), "cables: 'cable_1' is not a list"),

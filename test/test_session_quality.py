@@ -12,10 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from session_samples import edit_yaml, make_recording, rewrite, shift_stamp, stamped, write_single
+from session_samples import edit_yaml, make_recording, make_rig, rewrite, shift_stamp, stamped, write_single
 
 from rig_identification.cleaning.clipping import clipped_samples, limits
+from rig_identification.cleaning.recording import clean
 from rig_identification.cleaning.stamps import select_stamps
+from rig_identification.errors import InputError
+from rig_identification.raw import RawChannel, RawRecording, RawSession
 from rig_identification.recording import ChannelQuality, Recording, Series
 from rig_identification.session import read_session
 
@@ -313,3 +316,31 @@ def test_any_stamps_give_a_clock_that_runs_forwards(pair: tuple[np.ndarray, np.n
     assert np.all(stamps[selection.kept] > 0)
     assert (len(selection.kept) > 0) == bool(np.any(stamps > 0))
     assert min(selection.duplicated, selection.backward) >= 0
+
+
+@pytest.mark.parametrize(("pause", "kept"), [(600.0, 300), (1e9, 200)])
+def test_both_clocks_that_jump_for_years_are_no_pause(pause: float, kept: int) -> None:
+    """A machine without a battery finds its network: stamps and receive times jump together."""
+    stamps = (1 + np.arange(300)) * 20_000_000 + 1_793_243_600_000_000_000
+    stamps[200:] += round(pause * 1e9)
+    selection = select_stamps(stamps, stamps + 2_000_000)
+    assert selection.kept.tolist() == list(range(kept))
+    assert bool(selection.notes) == (kept < 300)
+
+
+@pytest.mark.parametrize(
+    ("kind", "hours", "refused"),
+    [("dynamic", 2.0, ""), ("dynamic", 4.0, "10800 s"), ("static", 4.0, ""), ("static", 30.0, "86400 s")],
+)
+def test_a_recording_of_days_is_refused(kind: str, hours: float, refused: str) -> None:
+    """Few samples whose stamps lie far apart: a model of every second between takes gigabytes."""
+    count = 40
+    stamps = 1_793_243_600_000_000_000 + (np.arange(count) * hours * 3.6e12 / (count - 1)).astype(np.int64)
+    values = 4000.0 + np.random.default_rng(0).standard_normal((count, 1))
+    cell = RawChannel("/rig/cable_1/wrench", "tension", "", stamps, stamps, values, "cable_1")
+    raw = RawSession("s", make_rig(), (RawRecording("run_1", kind, False, "run_1", (cell,)),))
+    if refused:
+        with pytest.raises(InputError, match=refused):
+            clean(raw)
+    else:
+        assert clean(raw).recordings[0].duration == pytest.approx(hours * 3600.0)

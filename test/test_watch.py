@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
+from rig_identification.errors import InputError
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.raw import RawChannel, RawRecording, RawSession
 from rig_identification.recording import Recording, Series, Session
+from rig_identification.session.exciter_commands import HEAD, read_commands
 from rig_identification.simulate import simulate_session
+from rig_identification.simulate.exciter import ForceProgram, Multisine, UnbalancedMass
 from rig_identification.topics import FIXED_TOPICS, WRENCH
 from rig_identification.watch.forecast import Forecast, forecast
 from rig_identification.watch.look import look
 from rig_identification.watch.part import going_on, repeats, so_far, until
+from rig_identification.watch.planned import begun
 from rig_identification.watching import Expected, Watching
 
 #: Of every load cell of the second cable: it reads 1.5 % high.
@@ -114,9 +119,19 @@ def test_a_run_is_watched_from_its_beginning_on() -> None:
     assert told.verdict == "none"
     assert told.forecast is not None
     assert told.forecast["enough"] == pytest.approx(4.5, abs=0.1)  # an aim as wide as that is there already
+    assert told.forecast["force"] == "repeated"
     later = watching.look(raw_of(so_far(session, 8.0)), whole=False)
     assert later.verdict == "none"
     assert later.forecast == told.forecast
+    # The same look by whom the plan is known: the exciter was told to begin 1.2 s before the window was open
+    motor = shaken(10, SECONDS).runs[0].force
+    assert motor is not None
+    at = np.arange(0.0, SECONDS, 0.02)
+    plans = {"shake": Series(at, motor(at - 1.2))}
+    knowing = Watching(Expected(seconds=SECONDS, aim=0.5, forces=plans))
+    planned = knowing.look(raw_of(so_far(session, 4.5))).forecast
+    assert planned is not None
+    assert planned["force"] == "planned"
 
 
 def test_a_length_that_is_enough_lies_between_those_looked_at() -> None:
@@ -148,3 +163,73 @@ def test_a_force_goes_on_as_it_was_last(period: float) -> None:
     assert planned is not None
     assert np.all(planned.values[new] == 7.0)
     assert np.array_equal(planned.values[~new], series.values)
+
+
+#: Two plans; the second one is another force.
+PLANS: tuple[ForceProgram, ForceProgram] = (
+    Multisine(40.0, (0.4, 0.77, 1.31), ramp=2.0), UnbalancedMass(1.2, 0.9, "xz", ramp=3.0)
+)  # fmt: skip
+
+
+def planned(program: ForceProgram, seconds: float = 30.0) -> Series:
+    """Fifty commands a second."""
+    at = np.arange(0.0, seconds, 0.02)
+    return Series(at, program(at))
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("start", [-2.5, 0.0, 1.7])
+def test_a_planned_force_is_found_in_the_measured_one(which: int, start: float) -> None:
+    """Begun before the window or in it, 8 % weaker than commanded, among noise."""
+    plans = {name: planned(program) for name, program in zip(("swept", "turned"), PLANS, strict=True)}
+    at = np.arange(0.0, 6.0, 1.0 / 300.0)
+    noise = 0.5 * np.random.default_rng(3).standard_normal((at.size, 3))
+    true = 0.92 * PLANS[which](at - start)
+    found = begun(Series(at, true + noise), plans, "run_1")
+    assert found is not None
+    assert found.recording == ("swept", "turned")[which]
+    assert found.factor == pytest.approx(0.92, abs=0.02)
+    later = np.arange(6.0, 25.0, 0.01)
+    expected = 0.92 * PLANS[which](later - start)
+    off = found(later) - expected
+    assert np.sqrt(np.mean(off**2)) < 0.1 * np.sqrt(np.mean(expected**2))
+    assert not np.any(found(np.array([start + 30.1, 40.0])))  # the plan is over
+
+
+def test_a_force_that_is_not_planned_is_none_of_the_plans() -> None:
+    at = np.arange(0.0, 6.0, 1.0 / 300.0)
+    plans = {"swept": planned(PLANS[0])}
+    assert begun(Series(at, PLANS[1](at)), plans, "run_1") is None
+    noise = np.random.default_rng(4).standard_normal((at.size, 3))
+    assert begun(Series(at, noise), plans, "run_1") is None  # the exciter stands still
+    assert begun(Series(at, np.zeros((at.size, 3))), plans, "run_1") is None
+    assert begun(Series(at, PLANS[0](at)), {"swept": Series(np.arange(9.0), np.zeros((9, 3)))}, "") is None
+    # Where a plan bears the window's name, that one is meant
+    both = {"swept": planned(PLANS[0]), "run_1": planned(PLANS[1])}
+    assert begun(Series(at, PLANS[0](at)), both, "run_1") is None
+    assert begun(Series(at, PLANS[0](at)), both, "run_2") is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("recording,time_s,force_x_N,force_y_N\n", "line 1: column force_z_N is missing"),
+        ("", "line 1: column recording is missing"),
+        ("{head}\n", "holds no command"),
+        ("{head}\nrun_1,0,,,1,2,3\n", "'run_1': one command is no run"),
+        ("{head}\nrun_1,0,,,1,2,3\nrun_1,0.02,,,1,much,3\n", "line 3: force_y_N: 'much' is not a finite"),
+        ("{head}\nrun_1,0,,,1,2,3\nrun_1,0.02,,,1,nan,3\n", "line 3: force_y_N: 'nan' is not a finite"),
+        ("{head}\nrun_1,0,,,1,2,3\nrun_1,0.02\n", "line 3: force_x_N: missing; the line has 2"),
+        ("{head}\nrun_1,1,,,1,2,3\nrun_1,0.5,,,1,2,3\n", "'run_1': time_s does not run forwards at 0.5 s"),
+        ("{head}\n\xff\n", "is no text"),
+        ("{head}\n" + "x" * 200_000 + "\n", "field larger than"),
+    ],
+)
+def test_a_file_that_holds_no_commands_is_one_line(text: str, told: str, tmp_path: Path) -> None:
+    file = tmp_path / "exciter.csv"
+    file.write_bytes(text.replace("{head}", ",".join(HEAD)).encode("latin-1"))
+    with pytest.raises(InputError, match=told) as refused:
+        read_commands(file)
+    assert str(refused.value).startswith(str(file))
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 500

@@ -16,6 +16,7 @@ from rig_identification.check.inventory import inventory
 from rig_identification.check.left_aside import left_aside
 from rig_identification.check.order import out_of_order
 from rig_identification.check.stamps.streams import in_order
+from rig_identification.cleaning.damaged import session_without_damaged
 from rig_identification.examination import Examination, SetupFault
 from rig_identification.raw import RawSession
 
@@ -34,7 +35,7 @@ class Examined:
 
 def examine(raw: RawSession, progress: Callable[[str], None] | None = None) -> Examined:
     """Examine a session. progress: called with one sentence before each stage."""
-    session, faults = raw, list[SetupFault]()
+    session, faults = session_without_damaged(raw), list[SetupFault]()
     for stage, package in (("stamps", stamps), ("copies", consistency), ("readings", readings)):
         if progress is not None:
             progress(f"checking {stage}")

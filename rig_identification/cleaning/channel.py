@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.cleaning.clipping import Limit, limits
+from rig_identification.cleaning.damaged import without_damaged
 from rig_identification.cleaning.stamps import StampSelection, select_stamps
 from rig_identification.errors import InputError
 from rig_identification.raw import RawChannel
@@ -31,8 +32,6 @@ IN_PART = ("imu", "inclination", "mocap")
 _POSES = ("mocap", "ground_truth")
 _POSE_WIDTH = 7
 _GAP = 1.5  # median intervals
-#: No channel measures this in SI units: damaged bytes read as a number.
-_ABSURD = 1e12
 #: Samples after which a value that never changes is worth a note.
 _STUCK = 50
 
@@ -120,9 +119,7 @@ def _clean(
     values: NDArray[np.float64],
     moving: bool,
 ) -> Channel:
-    # What is NaN was not measured; a number that cannot be tells that its message is damaged
-    damaged = np.any(np.abs(values) >= _ABSURD, axis=1)
-    values = np.where(damaged[:, None], np.nan, values)
+    values = without_damaged(values).copy()
     notes: tuple[str, ...] = ()
     if topic.channel in _POSES:
         values = _with_unit_quaternions(values)

@@ -14,6 +14,8 @@ from rig_identification.topics import foreign_cable, other_namespace
 
 #: A dynamic run must last this long to tell anything.
 SHORTEST_RUN = 1.0  # s
+#: s, by kind, that a recording lasts at most; what seems to last longer has stamps of no clock.
+LONGEST = {"static": 86_400.0, "dynamic": 10_800.0}
 #: Clocks of two devices may differ by tolerances, not by this: then one of them was never set.
 _CLOCKS_APART = 60_000_000_000  # ns
 #: Channels that cannot be used without knowing where the device sits.
@@ -27,7 +29,7 @@ def clean(raw: RawSession) -> Session:
     ------
     InputError
         The first recording that cannot be used: no topic of the contract, no usable stamp, a static recording
-        that moves, a run too short.
+        that moves, a run too short, one that seems to last for days.
     """
     recordings = tuple(_cleaned(recording, raw.rig, raw.namespace) for recording in raw.recordings)
     return Session(name=raw.name, rig=raw.rig, recordings=recordings)
@@ -55,6 +57,7 @@ def _usable(raw: RawRecording, rig: Rig, namespace: str) -> Recording:
     together, apart = _on_one_clock(channels)
     start_ns = min(int(channel.ordered_ns[0]) for channel in together)
     duration = (max(int(channel.ordered_ns[-1]) for channel in together) - start_ns) / 1e9
+    _check_length(raw, together, duration)
     reasons = {id(channel): _left_aside(channel, rig, raw.where) for channel in together}
     used = [channel for channel in together if reasons[id(channel)] is None]
     quality = [channel.quality(start_ns, *filter(None, [reasons[id(channel)]])) for channel in together]
@@ -81,6 +84,17 @@ def _on_one_clock(channels: list[Channel]) -> tuple[list[Channel], list[Channel]
     near = [abs(middle - reference) <= reach for middle in middles]
     together = [channel for channel, is_near in zip(channels, near, strict=True) if is_near]
     return together, [channel for channel, is_near in zip(channels, near, strict=True) if not is_near]
+
+
+def _check_length(raw: RawRecording, channels: list[Channel], duration: float) -> None:
+    """Raise InputError where a recording seems to last for days: every second of it costs memory and time."""
+    longest = LONGEST[raw.kind]
+    if duration > longest:
+        channel = max(channels, key=lambda channel: int(np.ptp(channel.ordered_ns)))
+        raise InputError(
+            f"{raw.where}: {channel.topic.name}: the recording spans {duration:.3g} s, more than the "
+            f"{longest:g} s of a {raw.kind} one; correct the stamps, or cut it into recordings"
+        )
 
 
 def _left_aside(channel: Channel, rig: Rig, where: str) -> str | None:

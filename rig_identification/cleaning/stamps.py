@@ -15,6 +15,9 @@ Indices = NDArray[np.int64]
 _SECOND = 1_000_000_000
 #: Receive times may jitter this much against stamps before a clock is taken to have stepped.
 _RECEIVE_JITTER = _SECOND
+#: A pause that receive times tell of as well is one up to here. Where both clocks say more, the clock of the
+#: whole machine was set, as one without a battery is once it finds a network.
+_LONGEST_PAUSE = 3600 * _SECOND
 #: A late message is put back in its place only where there is room for it, in median intervals.
 _ROOM = 0.6
 
@@ -72,10 +75,14 @@ def _median_interval(stamps: Stamps) -> float:
 
 
 def _near(stamps: Stamps, received: Stamps) -> NDArray[np.bool_]:
-    """Stamps within reach of the median one: twice the recording's length and a minute."""
+    """Stamps within reach of the median one: twice the recording's length and a minute.
+
+    Its length is what its messages fill, or what receive times say, pauses included.
+    """
     if not len(stamps):
         return np.zeros(0, bool)
-    span = max(len(stamps) * _median_interval(np.sort(stamps, kind="stable")), float(np.ptp(received)))
+    filled = len(stamps) * _median_interval(np.sort(stamps, kind="stable"))
+    span = max(filled, min(float(np.ptp(received)), filled + _LONGEST_PAUSE))
     middle = np.partition(stamps, len(stamps) // 2)[len(stamps) // 2]
     return np.asarray(np.abs(stamps - middle) <= 2.0 * span + 60.0 * _SECOND)
 

@@ -83,8 +83,10 @@ def white_floor(time: Array, values: Array) -> Array:
     its logarithm is digamma(1) below the logarithm of its mean.
     """
     count = values.shape[0] // SEGMENT
+    if count < FEWEST:  # and a single sample has no step
+        return np.zeros(values.shape[1])
     steps = np.diff(time[: count * SEGMENT], prepend=2.0 * time[0] - time[1]).reshape(count, SEGMENT)
-    even = np.all(np.abs(steps - np.median(steps)) < UNEVEN * np.median(steps), axis=1) if count else []
+    even = np.all(np.abs(steps - np.median(steps)) < UNEVEN * np.median(steps), axis=1)
     if np.count_nonzero(even) < FEWEST:
         return np.zeros(values.shape[1])
     pieces = values[: count * SEGMENT].reshape(count, SEGMENT, -1)[even]

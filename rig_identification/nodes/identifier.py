@@ -53,6 +53,11 @@ PARAMETERS = (
     OwnParameter(
         "aim", 0.01, "95 % half-width of J as a share of its size that is enough", within(1e-6, 1.0)
     ),
+    OwnParameter(
+        "planned_force",
+        "",
+        "exciter.csv of rig-identification plan, for the forecast; empty: the force goes on as it was last",
+    ),
     *RECORDING,
 )
 #: Parts of a result that each request is answered with.
@@ -90,6 +95,10 @@ class IdentifierNode(RigNode):
     def __init__(self) -> None:
         super().__init__("identifier", PARAMETERS)
         self._description = self.rig()
+        self.watcher = Watcher(
+            self, self._description, self.own.number("watch_period"), self.own.number("planned_seconds"),
+            self.own.number("aim"), self.own.text("planned_force"),
+        )  # fmt: skip
         spool = self.own.text("spool")
         self._temporary = not spool
         folder = Path(spool).expanduser() if spool else Path(tempfile.mkdtemp(prefix="rig_identifier_"))
@@ -100,10 +109,6 @@ class IdentifierNode(RigNode):
         self.windows = SessionFolder(folder, self._description, topics, self.own.text("storage"))
         self.intake = Intake(self, topics, self.own.whole("depth"), watch_range=True)
         self.running = RunningEstimator(self, self._description, self.own.number("running_rate"))
-        self.watcher = Watcher(
-            self, self._description, self.own.number("watch_period"), self.own.number("planned_seconds"),
-            self.own.number("aim"),
-        )  # fmt: skip
         self.fits = Fits(lambda: self.get_clock().now().nanoseconds / 1e9, self._tell, self._publish)
         self.keeper = BagKeeper(self, self.windows, self.intake)
         self._offer()

@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
+from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 from std_msgs.msg import Float64MultiArray
 
 from rig_identification.errors import InputError
 from rig_identification.live.number_lines import LineFormat
+from rig_identification.nodes.managed import ManagedNode
 from rig_identification.nodes.parameters import OwnParameter, one_of, within
 from rig_identification.nodes.plant_message import TOPIC, from_message
-from rig_identification.nodes.rig_node import OK, WARN, RigNode, diagnostic, reliable
+from rig_identification.nodes.rig_node import OK, WARN, diagnostic, reliable
 from rig_identification.nodes.sources import DeviceErrors, FileSource, SerialSource, SimulatedSource, Source
 from rig_identification.nodes.wire import TYPES
 from rig_identification.rig import Rig
@@ -93,24 +96,40 @@ class Device:
     turned: bool = True  # what it reads depends on how it is turned against the body
 
 
-class SensorNode(RigNode):
-    """Samples of one device, published as they come."""
+class SensorNode(ManagedNode):
+    """Samples of one device, published as they come while the node is active."""
 
     def __init__(self, name: str, device_of: Callable[[Rig], Device]) -> None:
         super().__init__(name, PARAMETERS)
-        rig = self.rig()
-        self.device = device_of(rig)
-        known = expected_topics(tuple(cable.name for cable in rig.cables), namespace="")
-        self._outlets: list[tuple[Topic, slice, object]] = []
+        self._description = self.rig()
+        self.device = device_of(self._description)
+        self._outlets: list[tuple[Topic, slice, Publisher]] = []
+        self._plant: Subscription | None = None
+        self.published = 0
+        self.source: Source | None = None
+        self.every(self.own.number("period"), self._publish)
+        self.begin()
+
+    def open(self) -> None:
+        """Open the device and advertise its topics. Raises InputError."""
+        self.source = self._make_source(self._description)
+        known = expected_topics(tuple(cable.name for cable in self._description.cables), namespace="")
         for contract_name, columns in self.device.topics:
             topic = known[f"/{contract_name}"]
             # A second of samples, and more of a slow device: a listener may be kept waiting for its turn
             depth = max(1000, int(self.own.number("simulation.rate")))
             publisher = self.create_publisher(TYPES[topic.message_type], contract_name, reliable(depth))
             self._outlets.append((topic, columns, publisher))
-        self.published = 0
-        self.source = self._make_source(rig)
-        self.every(self.own.number("period"), self._publish)
+
+    def shut(self) -> None:
+        """Close the device and take back its topics."""
+        if self.source is not None:
+            self.source.close()
+        for _, _, publisher in self._outlets:
+            self.destroy_publisher(publisher)
+        if self._plant is not None:
+            self.destroy_subscription(self._plant)
+        self.source, self._outlets, self._plant = None, [], None
 
     def _make_source(self, rig: Rig) -> Source:
         kind = self.own.text("source")
@@ -121,8 +140,12 @@ class SensorNode(RigNode):
                 raise InputError(
                     "parameter serial.port: is empty; give the amplifier's port, as /dev/ttyUSB0"
                 )
+            # Started by itself it waits for its device; whoever configures it is told that there is none
             return SerialSource(
-                self.own.text("serial.port"), self.own.whole("serial.baud_rate"), self._format()
+                self.own.text("serial.port"),
+                self.own.whole("serial.baud_rate"),
+                self._format(),
+                at_once=not self.own.flag("autostart"),
             )
         return FileSource(Path(self.own.text("file.path")).expanduser(), self._format())
 
@@ -159,7 +182,7 @@ class SensorNode(RigNode):
         def hear(message: Float64MultiArray) -> None:
             source.add(from_message(message))
 
-        self.create_subscription(Float64MultiArray, TOPIC, self.guarded(hear), reliable(200))
+        self._plant = self.create_subscription(Float64MultiArray, TOPIC, self.guarded(hear), reliable(200))
         return source
 
     def _format(self) -> LineFormat:
@@ -182,28 +205,30 @@ class SensorNode(RigNode):
         )
 
     def _publish(self) -> None:
-        stamps, values = self.source.take(self.get_clock().now().nanoseconds)
+        if self.source is None:
+            return
+        now_ns = self.get_clock().now().nanoseconds
+        if not self.active:
+            self.source.skip(now_ns)
+            return
+        stamps, values = self.source.take(now_ns)
         if not len(stamps):
             return
         for topic, columns, publisher in self._outlets:
             for row in serialize(topic, stamps, values[:, columns]):
-                publisher.publish(row.tobytes())  # type: ignore[attr-defined]
+                publisher.publish(row.tobytes())
         self.published += len(stamps)
 
     def status(self) -> list[DiagnosticStatus]:
         """How many samples went out, and what the source complains of."""
-        complaint = self.source.complaint()
+        complaint = "" if self.source is None else self.source.complaint()
         line = diagnostic(
             f"{self.get_name()}: source",
             WARN if complaint else OK,
-            complaint or "samples flow",
+            complaint or ("samples flow" if self.active else f"nothing is sent: the node is {self.state}"),
             published=self.published,
         )
         return [*super().status(), line]
-
-    def close(self) -> None:
-        """Give back the source."""
-        self.source.close()
 
 
 def noise_names(*counts: tuple[str, int]) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,10 @@ class Source(ABC):
     @abstractmethod
     def take(self, now_ns: int) -> tuple[Stamps, Array]:
         """Stamps (n,) ns and values (n, w) since the last call."""
+
+    def skip(self, now_ns: int) -> None:
+        """Let go what came since the last call: nobody wants it."""
+        self.take(now_ns)
 
     def complaint(self) -> str:
         """What is wrong at the moment; empty: nothing."""
@@ -101,8 +106,10 @@ class SerialSource(Source):
 
     RETRY = 0.5  # s
 
-    def __init__(self, port: str, baud_rate: int, line_format: LineFormat) -> None:
+    def __init__(self, port: str, baud_rate: int, line_format: LineFormat, *, at_once: bool = False) -> None:
+        """at_once: raise InputError where the port cannot be opened now."""
         self._port, self._baud_rate, self._format = port, baud_rate, line_format
+        self._opened = self._open() if at_once else None
         self._samples: deque[tuple[int, Array]] = deque(maxlen=100_000)
         self._complaint = f"{port} is not open yet"
         self.bad_lines = 0
@@ -110,12 +117,22 @@ class SerialSource(Source):
         self._thread = threading.Thread(target=self._watch, name=f"serial {port}", daemon=True)
         self._thread.start()
 
+    def _open(self) -> Any:
+        import serial
+
+        try:
+            return serial.Serial(self._port, self._baud_rate, timeout=0.1)
+        except (serial.SerialException, OSError, ValueError) as error:
+            told = " ".join(str(error).split())
+            raise InputError(f"parameter serial.port: {self._port}: {told}; plug the device in") from error
+
     def _watch(self) -> None:
         import serial
 
         while not self._ending.is_set():
             try:
-                with serial.Serial(self._port, self._baud_rate, timeout=0.1) as line:
+                opened, self._opened = self._opened, None
+                with opened or serial.Serial(self._port, self._baud_rate, timeout=0.1) as line:
                     self._complaint = ""
                     self._read(line)
             except (serial.SerialException, OSError, TypeError) as error:
@@ -159,7 +176,7 @@ class SerialSource(Source):
 
 
 class FileSource(Source):
-    """A logger's CSV played in real time: its first line is due when the node starts."""
+    """A logger's CSV played in real time: its first line is due when somebody first wants it."""
 
     def __init__(self, file: Path, line_format: LineFormat) -> None:
         if line_format.time_column is None:
@@ -189,6 +206,11 @@ class FileSource(Source):
         chosen = slice(self._next, due)
         self._next = max(due, self._next)
         return self._start + np.round(1e9 * self._time[chosen]).astype(np.int64), self._values[chosen]
+
+    def skip(self, now_ns: int) -> None:
+        """Lines that are due are let go, once the first one was taken."""
+        if self._start is not None:
+            self.take(now_ns)
 
     def complaint(self) -> str:
         """The file is over."""

@@ -1,7 +1,8 @@
 """The program that looks at a window while it is recorded, beside the node that records it.
 
-``python -m rig_identification.nodes.watch_program RIG SECONDS AIM NAMESPACE``. Each line of its standard
-input names a file of :mod:`gathered` and whether its last window is whole. Each is answered by one line of
+``python -m rig_identification.nodes.watch_program RIG SECONDS AIM NAMESPACE [COMMANDS]``. COMMANDS holds the
+exciter's planned force (session/exciter_commands.py). Each line of its standard input names a file of
+:mod:`gathered` and whether its last window is whole. Each is answered by one line of
 JSON, ``{"kind": "watched", ...}``. It runs when nobody else wants the core, and ends with its input.
 """
 
@@ -43,17 +44,19 @@ def told(watching: Any, raw: RawSession, whole: bool) -> dict[str, Any]:
     }
 
 
-def main(rig_file: str, seconds: str, aim: str, namespace: str) -> None:
+def main(rig_file: str, seconds: str, aim: str, namespace: str, commands: str = "") -> None:
     """Answer each line until there are no more."""
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what anything prints is no line of an answer
     with contextlib.suppress(AttributeError, OSError):  # not everywhere
         os.nice(NICE)
     from rig_identification.session import read_rig
+    from rig_identification.session.exciter_commands import read_commands
     from rig_identification.watching import Expected, Watching
 
     rig = read_rig(Path(rig_file))
-    watching = Watching(Expected(float(seconds), float(aim)))
+    forces = read_commands(Path(commands)) if commands else {}
+    watching = Watching(Expected(float(seconds), float(aim), forces))
     for line in sys.stdin:
         asked = json.loads(line)
         begun = time.monotonic()

@@ -14,11 +14,13 @@ from typing import Any
 
 from std_msgs.msg import String
 
+from rig_identification.errors import InputError
 from rig_identification.nodes.gathered import Gathered, write_gathered
 from rig_identification.nodes.intake import Batch
 from rig_identification.nodes.rig_node import LATCHED, RigNode
 from rig_identification.nodes.session_folder import RecordingPlan, SessionFolder
 from rig_identification.rig import Rig
+from rig_identification.session.exciter_commands import read_commands
 from rig_identification.session.rig_document import rig_document
 from rig_identification.watching import LONGEST, SHORTEST
 
@@ -39,11 +41,21 @@ class Watcher:
         s between the end of a look and the next one, at least as long as that took; 0: nothing is watched.
     seconds, aim : float
         Planned length of a run, s, and the share of J's size to which it is to be known (watching.py).
+    planned_force : str
+        File of the exciter's commands, for the forecast; empty: none.
+
+    Raises
+    ------
+    InputError
+        That file cannot be used.
     """
 
-    def __init__(self, node: RigNode, rig: Rig, period: float, seconds: float, aim: float) -> None:
+    def __init__(
+        self, node: RigNode, rig: Rig, period: float, seconds: float, aim: float, planned_force: str = ""
+    ) -> None:
         self._node, self._rig, self._period = node, rig, period
         self._arguments = (f"{seconds}", f"{aim}", node.get_namespace())
+        self._commands = _commands(rig, planned_force) if planned_force else b""
         self._publisher = node.create_publisher(String, "~/watch", LATCHED)
         self._at_rest: list[Gathered] = []
         self._open: Gathered | None = None
@@ -99,15 +111,18 @@ class Watcher:
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="rig_watch_"))
             SessionFolder(self._folder, self._rig, {}).write_yaml("rig.yaml", rig_document(self._rig))
+        arguments = [str(self._folder / "rig.yaml"), *self._arguments]
+        if self._commands:
+            (self._folder / "exciter.csv").write_bytes(self._commands)
+            arguments.append(str(self._folder / "exciter.csv"))
         self._starts += 1
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "rig_identification.nodes.watch_program", str(self._folder / "rig.yaml"),
-             *self._arguments],
+            [sys.executable, "-m", "rig_identification.nodes.watch_program", *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, "OMP_NUM_THREADS": "1"},
             start_new_session=True,  # a terminal's Ctrl-C is the node's business
-        )  # fmt: skip
+        )
         assert self._process.stdout is not None
         os.set_blocking(self._process.stdout.fileno(), False)
         return self._process
@@ -152,3 +167,17 @@ class Watcher:
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
             self._folder = None
+
+
+def _commands(rig: Rig, file: str) -> bytes:
+    """The exciter's commands as they stand in the file now. Raises InputError where they cannot be used."""
+    if rig.exciter is None:
+        raise InputError("parameter planned_force: the rig description has no exciter; leave it out")
+    path = Path(file).expanduser()
+    try:
+        read_commands(path)
+        return path.read_bytes()
+    except InputError as error:
+        raise InputError(f"parameter planned_force: {error}") from error
+    except OSError as error:
+        raise InputError(f"parameter planned_force: {path}: {error.strerror}; name another file") from error

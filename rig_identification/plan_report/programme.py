@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from rig_identification.plan.planning import Plan
+from rig_identification.session.exciter_commands import HEAD
 from rig_identification.simulate import Multisine, Pulled, UnbalancedMass
 
 #: Rows a second of the exciter's commands.
 COMMAND_RATE = 50.0
-HEAD = ("recording", "time_s", "speed_hz", "angle_rad", "force_x_N", "force_y_N", "force_z_N")
 
 
 def session_text(plan: Plan, rig: str) -> str:

@@ -204,9 +204,13 @@ class Fields:
     def _finite(self, key: str, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise self.fault(key, f"{shown(value)} is not a number{number_hint(value)}")
-        if not math.isfinite(value):
-            raise self.fault(key, f"{value} is not finite")
-        return float(value)
+        try:
+            number = float(value)
+        except OverflowError:  # a whole number of more than 308 digits
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.fault(key, f"{shown(value)} is not finite")
+        return number
 
 
 def number_hint(value: object) -> str:

@@ -9,6 +9,7 @@ from rig_identification.errors import InputError, MissingDescription, did_you_me
 from rig_identification.session.bag_files import is_bag_file, kind_of, without_copies
 from rig_identification.session.bag_metadata import NAME as METADATA
 from rig_identification.session.fields import Fields
+from rig_identification.session.yaml_text import beginning_of
 
 FILE = "session.yaml"
 _YAML = (".yaml", ".yml")
@@ -117,9 +118,9 @@ def _way_up(path: Path) -> str:
 
 def _lists_recordings(file: Path) -> bool:
     """Whether a YAML file has the list that makes it a session's description."""
-    if file.suffix.lower() not in _YAML or not file.is_file():
+    if file.suffix.lower() not in _YAML:
         return False
-    text = file.read_bytes()[: 1 << 20].decode("utf-8", errors="replace")
+    text = beginning_of(file, 1 << 20)
     return any(line.startswith("recordings:") for line in text.splitlines())
 
 

@@ -17,6 +17,7 @@ from rig_identification.rig import Cable, Mount, Rig
 from rig_identification.session.bag import read_bag
 from rig_identification.session.not_a_session import FILE, bags_in
 from rig_identification.session.rig_description import read_rig
+from rig_identification.session.yaml_text import beginning_of
 from rig_identification.topics import foreign_cable
 
 #: Reads and cleans one bag as a dynamic run of a rig.
@@ -69,9 +70,7 @@ def recordings_lines(
 def _rig_files(folder: Path) -> tuple[Path | None, list[Path]]:
     """The first YAML file in the folder that is a rig description, and those that look like one."""
     alike = [
-        file
-        for file in sorted(folder.glob("*.y*ml"))
-        if "ros__parameters" in file.read_bytes()[: 1 << 16].decode("utf-8", errors="replace")
+        file for file in sorted(folder.glob("*.y*ml")) if "ros__parameters" in beginning_of(file, 1 << 16)
     ]
     for file in alike:
         try:

@@ -31,22 +31,36 @@ class TooMuch(ValueError):
     """A text beyond the limits; the message says which, without the file's name."""
 
 
-def read_text(file: Path) -> str:
+def read_text(file: Path, largest: int = LARGEST) -> str:
     """Text of a regular file.
 
     Raises
     ------
     TooMuch
-        The file is larger than ``LARGEST`` bytes, or is no regular file, which might never end.
+        The file is larger than ``largest`` bytes, or is no regular file, which might never end.
     OSError, UnicodeDecodeError
         As of ``Path.read_text``.
     """
     size = file.stat().st_size
     if file.exists() and not (file.is_file() or file.is_dir()):
         raise TooMuch("it is a device or a pipe; give a file")
-    if size > LARGEST and file.is_file():
-        raise TooMuch(f"{size} bytes are more than the {LARGEST} that such a file may have")
+    if size > largest and file.is_file():
+        raise TooMuch(f"{size} bytes are more than the {largest} that such a file may have")
     return file.read_text(encoding="utf-8")
+
+
+def beginning_of(file: Path, size: int) -> str:
+    """The first ``size`` bytes of a file as far as they are text; "" for what cannot be read or is no file.
+
+    A pipe or a device might never end, and a link to itself leads nowhere.
+    """
+    if not file.is_file():
+        return ""
+    try:
+        with file.open("rb") as stream:
+            return stream.read(size).decode("utf-8", errors="replace")
+    except OSError:
+        return ""
 
 
 def load_yaml(text: str) -> object:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -84,9 +85,11 @@ class Folder:
             yield from (file for file in found if self._holds(file))
 
     def _holds(self, file: Path) -> bool:
-        """Whether a file lies in the folder by its links too."""
+        """Whether it is a file, no pipe that never ends, and lies in the folder by its links too."""
         try:
-            return not file.is_symlink() or file.resolve().is_relative_to(self.root)
+            if stat.S_ISREG(file.lstat().st_mode):
+                return True
+            return file.is_symlink() and file.is_file() and file.resolve().is_relative_to(self.root)
         except (OSError, RuntimeError):  # a link to itself
             return False
 

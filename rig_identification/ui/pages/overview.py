@@ -44,7 +44,7 @@ def _below(desk: Desk, file: Path) -> str:
 def _verdict(file: Path) -> str:
     """Verdict of a result; "" where there is none, or where reading it would take long."""
     try:
-        if file.stat().st_size > QUICK:
+        if not file.is_file() or file.stat().st_size > QUICK:
             return ""
         verdict = json.loads(file.read_text(encoding="utf-8"))["mismatch"]["verdict"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):

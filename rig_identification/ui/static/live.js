@@ -155,10 +155,11 @@
     const f = said.forecast;
     if (!f) return;
     const end = f.seconds[f.seconds.length - 1], percent = x => `${(100 * x).toPrecision(2)} %`;
-    text(find("#forecast .text"), f.enough === null
+    const force = f.force === "planned" ? " The exciter is taken to follow its plan." : "";
+    text(find("#forecast .text"), (f.enough === null
       ? `Each element of J will be known to ${percent(f.share[f.share.length - 1])} after ${end.toFixed(0)} s, not to the ${percent(f.aim)} that is aimed for.`
       : f.enough <= f.seconds[0] ? `Enough: each element of J is known to ${percent(f.aim)}. After ${end.toFixed(0)} s it would be ${percent(f.share[f.share.length - 1])}.`
-      : `Enough at ${f.enough.toFixed(0)} s: from then on each element of J is known to ${percent(f.aim)}. After ${end.toFixed(0)} s it will be ${percent(f.share[f.share.length - 1])}.`);
+      : `Enough at ${f.enough.toFixed(0)} s: from then on each element of J is known to ${percent(f.aim)}. After ${end.toFixed(0)} s it will be ${percent(f.share[f.share.length - 1])}.`) + force);
     chart(find("#forecast .plot"), {height: 170, legend: {show: false}, scales: {x: {time: false}, y: {distr: 3}},
       axes: [{...axis(), size: 40, label: "length of the run, s", labelSize: 16}, {...axis(), size: 64, label: "J, 95 %, in %", labelSize: 18}],
       series: [{}, {stroke: colour("accent"), width: 2, points: {show: true, size: 4}}, {stroke: colour("good"), width: 1, dash: [5, 4], points: {show: false}}]},
