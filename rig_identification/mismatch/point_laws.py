@@ -133,7 +133,7 @@ def _told(found: Estimates) -> Told:
 
 @dataclass(frozen=True)
 class Law:
-    """What is tried of a law at every place: a spring along a ``line``, or a brake that fades or saturates."""
+    """What is tried of a law at every place: a spring along a ``line``, a brake that fades or saturates."""
 
     line: tuple[float, float] | None
     narrow: float = 0.0  # in parts of what fades over the largest travel

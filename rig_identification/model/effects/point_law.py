@@ -7,7 +7,8 @@ The first part is a spring along the line d that hardens, softens or pushes (a m
 keeps energy, its potential being k1 s^2/2 + k2 s^3/3 + k3 s^4/4. The second is a brake to all sides that may
 fade with distance (an eddy-current brake, a rubbing brush, a sail away from the centre of mass) or saturate:
 an eddy-current brake pulls most at the speed 1/sqrt(w), and dry friction no more at any speed above that
-(c2/w). With c1, c2 >= 0 it only takes energy out. d = (cos e cos a, cos e sin a, sin e), azimuth a and elevation e.
+(c2/w). With c1, c2 >= 0 it only takes energy out. d = (cos e cos a, cos e sin a, sin e), azimuth a and
+elevation e.
 """
 
 from __future__ import annotations
