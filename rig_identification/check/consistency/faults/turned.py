@@ -129,7 +129,7 @@ def _sought(evidence: Evidence, rig: Rig, described: Mount) -> tuple[Found, ...]
     """
     run, account = evidence.session.runs[0], evidence.without(frozenset(["imu"]))
     still = evidence.session.at_rest[0].values.get("imu")
-    known = np.isfinite(run.values.get("imu", np.full((1, 6), np.nan))).all(axis=1)
+    known = np.asarray(np.isfinite(run.values.get("imu", np.full((1, 6), np.nan))).all(axis=1))
     if np.count_nonzero(known) < FEWEST or not account.motions:
         return ()
     read, alone = run.values["imu"][known], _along(rig, account.motions[0].trajectory, known)
