@@ -170,6 +170,19 @@ def test_a_motion_is_found_and_its_forces_agree(small: ReducedSession) -> None:
     assert tracker.cost(mirrored) > tracker.cost(run.values["mocap"]) + 20.0
 
 
+def test_a_tracker_alone_is_held_against_the_cables_in_any_room(small: ReducedSession) -> None:
+    """Its room may be turned by any heading that is tried; mirrored poses stretch the cables."""
+    fit = fit_rest(small.rig, small.at_rest)
+    assert fit is not None
+    tracker, poses = TrackerModel(small.rig, *fit.poses[0], None), small.runs[0].values["mocap"]
+    room = Rotation.from_rotvec([0.0, 0.0, np.pi / 6.0])
+    there = np.concatenate(
+        [room.apply(poses[:, :3]), (room * Rotation.from_quat(poses[:, 3:])).as_quat()], axis=1
+    )
+    assert tracker.cost(there) == pytest.approx(tracker.cost(poses), abs=1e-6)
+    assert tracker.cost(poses * [1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0]) > tracker.cost(poses) + 5.0
+
+
 def test_a_tracker_whose_marker_is_described_takes_part_in_the_motion(small: ReducedSession) -> None:
     """Without the IMU it tells the motion; in a room of another heading it tells the same."""
     run = small.runs[0]

@@ -153,10 +153,12 @@ def _sought(evidence: Evidence, rig: Rig, described: Mount) -> tuple[Found, ...]
 
 
 def _contradicted(described: Mount, found: Found) -> bool:
-    """Whether the described mount is not the one found, by more than the motion leaves open."""
+    """Whether the IMU lies otherwise than described, by more than the motion leaves open.
+
+    What a smaller turn brings over from other axes is an ordinary error, and the search's.
+    """
     turn = Rotation.from_quat(described.orientation).inv() * Rotation.from_quat(found.mount.orientation)
-    away = float(np.linalg.norm(found.mount.position - described.position))
-    return turn.magnitude() > CLEAR * found.turn_std or away > CLEAR * found.place_std
+    return bool(turn.magnitude() > max(ORDINARY, CLEAR * found.turn_std))
 
 
 @dataclass(frozen=True)
