@@ -462,6 +462,15 @@ def test_an_imu_at_a_mount_that_no_line_gives_is_found_by_the_motion(clean: RawS
     assert away < max(3.0 * mended.tolerance["imu_position"], 0.2)
 
 
+def test_no_mount_is_sought_where_nothing_moves(clean: RawSession) -> None:
+    """Rest alone tells no heading of an IMU that hangs upside down."""
+    upside_down = changed(clean, "imu", columns(-1.0, slice(3, 6)))
+    resting = tuple(r for r in upside_down.recordings if r.kind == "static")
+    evidence = Evidence(reduced(replace(upside_down, recordings=resting)))
+    assert evidence.bound(frozenset(["imu"])) > 10.0
+    assert list(imu_turned.hypotheses(evidence)) == []
+
+
 def test_a_mount_that_the_motion_does_not_tell_is_not_guessed(small: ReducedSession) -> None:
     """It is said that the IMU lies otherwise, whose mount it was given, and it is left out."""
     lies = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_quat()

@@ -39,6 +39,8 @@ ROUNDS, FITS = 4, 3
 SAME = 1e-6
 #: Std by which a mount has to be off the described one before it is asked what it explains.
 CLEAR = 3.0
+#: m; a body is at least so large.
+LEAST = 1e-3
 #: Instants below which no mount is sought.
 FEWEST = 20
 
@@ -127,18 +129,22 @@ def _sought(evidence: Evidence, rig: Rig, described: Mount) -> tuple[Found, ...]
     The other devices tell the motion first; with the IMU on that mount all tell it better. How well the mount
     is known only the motion says that does without the IMU. None where that tells none, or the described one.
     """
-    run, account = evidence.session.runs[0], evidence.without(frozenset(["imu"]))
-    still = evidence.session.at_rest[0].values.get("imu")
+    runs, account = evidence.session.runs, evidence.without(frozenset(["imu"]))
+    if not runs or not account.motions:
+        return ()
+    run, still = runs[0], evidence.session.at_rest[0].values.get("imu")
     known = np.asarray(np.isfinite(run.values.get("imu", np.full((1, 6), np.nan))).all(axis=1))
-    if np.count_nonzero(known) < FEWEST or not account.motions:
+    if np.count_nonzero(known) < FEWEST:
         return ()
     read, alone = run.values["imu"][known], _along(rig, account.motions[0].trajectory, known)
-    size = float(np.ptp([c.body_point for c in rig.cables], axis=0).max())
+    size = max(float(np.ptp([c.body_point for c in rig.cables], axis=0).max()), LEAST)
     out: tuple[Found, ...] = ()
     for fit in range(FITS):
         if account.rest is None or not account.motions:
             break
         at, hangs = _along(rig, account.motions[0].trajectory, known), None
+        if not (np.isfinite(at.proper).all() and np.isfinite(at.lever).all()):
+            return ()
         if still is not None and np.isfinite(still[0, 3:]).all():
             hangs = (still[0, 3:], rig.gravity * account.rest.poses[0][1][2])
         mounts = [mounted(described, at, read, hangs, within) for within in (None, size)]
