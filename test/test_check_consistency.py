@@ -462,6 +462,16 @@ def test_an_imu_at_a_mount_that_no_line_gives_is_found_by_the_motion(clean: RawS
     assert away < max(3.0 * mended.tolerance["imu_position"], 0.2)
 
 
+def test_an_imu_that_only_the_second_run_heard_is_held_against_no_other_motion(small: ReducedSession) -> None:
+    """Of runs that differ in length the first one's motion is no measure of the second one's IMU."""
+    first = small.runs[0]
+    longer = {d: np.concatenate([v, v[:PER_SPAN]]) for d, v in first.values.items()}
+    second = replace(first, name="second", values=longer, time=np.arange(len(longer["imu"])) * first.kernel)
+    deaf = replace(first, values={d: v for d, v in first.values.items() if d != "imu"})
+    evidence = Evidence(ReducedSession(small.rig, (*small.at_rest, deaf, second)))
+    assert all(h.change is not None for h in judge.proposals(evidence))
+
+
 def test_no_mount_is_sought_where_nothing_moves(clean: RawSession) -> None:
     """Rest alone tells no heading of an IMU that hangs upside down."""
     upside_down = changed(clean, "imu", columns(-1.0, slice(3, 6)))
