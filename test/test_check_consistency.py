@@ -466,7 +466,9 @@ def test_an_imu_that_only_the_second_run_heard_is_held_against_no_other_motion(s
     """Of runs that differ in length the first one's motion is no measure of the second one's IMU."""
     first = small.runs[0]
     longer = {d: np.concatenate([v, v[:PER_SPAN]]) for d, v in first.values.items()}
-    second = replace(first, name="second", values=longer, time=np.arange(len(longer["imu"])) * first.kernel)
+    second = replace(
+        first, name="second", values=longer, time=first.kernel * np.arange(float(len(longer["imu"])))
+    )
     deaf = replace(first, values={d: v for d, v in first.values.items() if d != "imu"})
     evidence = Evidence(ReducedSession(small.rig, (*small.at_rest, deaf, second)))
     assert all(h.change is not None for h in judge.proposals(evidence))
