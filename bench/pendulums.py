@@ -4,11 +4,15 @@ By the project's own simulator: a check of the way from recordings to an answer,
 and doubts about it are drawn; two runs, the second held out. Each row is written as it is done.
 
     python -m bench.pendulums --out FILE [--seeds 2 3 4] [--kinds clean damping ...] [--threads 2]
+    python -m bench.pendulums --out FILE --seeds 2 --kinds damping --seconds 1800 --rate 180 --bags
+
+With ``--bags`` a session goes the whole way: written as bags, read, examined and identified.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,9 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.identification import identify_prepared, prepare
+from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, Identification
 from rig_identification.rig import DEFAULT_TOLERANCE, Cable, Rig
 from rig_identification.search.identify import identify
+from rig_identification.session import read_raw, write_session
 from rig_identification.simulate import Posed, RunSpec, SampleRates, SessionSpec, simulate_session
 
 Array = NDArray[np.float64]
@@ -37,8 +44,10 @@ KINDS: dict[str, Callable[[int, float, float], Effects]] = {
 }
 
 
-def drawn(kind: str, seed: int, threads: int) -> tuple[SessionSpec, Array]:
-    """A session's specification, and m, c, J (10,) of its body."""
+def drawn(
+    kind: str, seed: int, threads: int, seconds: float = 30.0, rate: float = 100.0
+) -> tuple[SessionSpec, Array]:
+    """A session's specification, and m, c, J (10,) of its body. seconds: of the first run; rate: Hz."""
     rng = np.random.default_rng([seed, *kind.encode(), threads])
     length, apart, mass = rng.uniform(1.0, 2.0), rng.uniform(0.35, 0.8), rng.uniform(0.8, 8.0)
     angles = 2.0 * np.pi * np.arange(threads) / threads
@@ -61,10 +70,10 @@ def drawn(kind: str, seed: int, threads: int) -> tuple[SessionSpec, Array]:
         return Posed(np.array([rng.normal(0.0, 0.01), y, 0.01 - length]), turn.as_quat())
 
     runs = (
-        RunSpec("run_1", 30.0, let_go(0.3, 0.02, 0.03)),
+        RunSpec("run_1", seconds, let_go(0.3, 0.02, 0.03)),
         RunSpec("run_2", 20.0, let_go(-0.2, -0.02, -0.03), holdout=True),
     )
-    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0)
+    rates = SampleRates(0.0, 0.0, 0.0, 0.0, 0.0, rate, 0.0)
     effects = KINDS[kind](threads, mass, length)
     return SessionSpec(kind, rig, elements, runs, rates=rates, effects=effects), elements
 
@@ -92,12 +101,36 @@ def row(spec: SessionSpec, seed: int, answer: Identification, elements: Array, s
     )
 
 
+def timed(session: Session) -> tuple[Identification, float]:
+    """The answer, and seconds until then."""
+    begin = time.monotonic()
+    return identify(session), time.monotonic() - begin
+
+
+def whole_way(session: Session) -> tuple[Identification, float]:
+    """The answer to the session as bags, and seconds of all threads' processor from reading to it."""
+    with tempfile.TemporaryDirectory() as folder:
+        bags = write_session(session, Path(folder) / "session", compression="storage")
+        begin = time.process_time()
+        prepared = prepare(read_raw(bags))
+        examined = time.process_time() - begin
+        answer = identify_prepared(prepared)
+        seconds = time.process_time() - begin
+    print(
+        f"examined in {examined:.1f} of {seconds:.1f} s of processor; {'; '.join(answer.notes)}", flush=True
+    )
+    return answer, seconds
+
+
 def main() -> None:
     """Write the table, row by row."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4])
     parser.add_argument("--kinds", nargs="+", choices=tuple(KINDS), default=list(KINDS))
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=30.0, help="length of the fitted run")
+    parser.add_argument("--rate", type=float, default=100.0, help="Hz, of the motion capture")
+    parser.add_argument("--bags", action="store_true", help="written, read and examined as well")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
     with given.out.open("w", encoding="utf-8") as file:
@@ -106,11 +139,10 @@ def main() -> None:
         file.write("| --- | --- | --- | --- | --- | --- | --- |\n")
         for kind in given.kinds:
             for seed in given.seeds:
-                spec, elements = drawn(kind, seed, given.threads)
+                spec, elements = drawn(kind, seed, given.threads, given.seconds, given.rate)
                 session, _ = simulate_session(spec, np.random.default_rng(seed))
-                begin = time.monotonic()
-                answer = identify(session)
-                line = row(spec, seed, answer, elements, time.monotonic() - begin)
+                answer, seconds = whole_way(session) if given.bags else timed(session)
+                line = row(spec, seed, answer, elements, seconds)
                 print(line, flush=True)
                 file.write(line + "\n")
                 file.flush()

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency import identical, judge
 from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.faults import turned as imu_turned
 from rig_identification.check.consistency.faults.axes import signed_permutations
 from rig_identification.check.consistency.forces import ForceModel
 from rig_identification.check.consistency.motion import MotionModel, nats
@@ -167,6 +168,19 @@ def test_a_motion_is_found_and_its_forces_agree(small: ReducedSession) -> None:
     tracker = TrackerModel(small.rig, *fit.poses[0], motion.trajectory)
     mirrored = run.values["mocap"] * [-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0]
     assert tracker.cost(mirrored) > tracker.cost(run.values["mocap"]) + 20.0
+
+
+def test_a_tracker_alone_is_held_against_the_cables_in_any_room(small: ReducedSession) -> None:
+    """Its room may be turned by any heading that is tried; mirrored poses stretch the cables."""
+    fit = fit_rest(small.rig, small.at_rest)
+    assert fit is not None
+    tracker, poses = TrackerModel(small.rig, *fit.poses[0], None), small.runs[0].values["mocap"]
+    room = Rotation.from_rotvec([0.0, 0.0, np.pi / 6.0])
+    there = np.concatenate(
+        [room.apply(poses[:, :3]), (room * Rotation.from_quat(poses[:, 3:])).as_quat()], axis=1
+    )
+    assert tracker.cost(there) == pytest.approx(tracker.cost(poses), abs=1e-6)
+    assert tracker.cost(poses * [1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0]) > tracker.cost(poses) + 5.0
 
 
 def test_a_tracker_whose_marker_is_described_takes_part_in_the_motion(small: ReducedSession) -> None:
@@ -422,3 +436,71 @@ def test_two_parallel_cables_tell_nothing_of_a_trackers_sense(seed: int, tmp_pat
     spec = SessionSpec("bar", rig, body, (run,), rates=rates)
     session, _ = simulate_session(spec, np.random.default_rng(seed))
     assert told(read_raw(write_session(session, tmp_path / "bar"))) == []
+
+
+def test_an_imu_at_a_mount_that_no_line_gives_is_found_by_the_motion(clean: RawSession) -> None:
+    """With a tracker the motion is known without it: its turn and place are told, and corrected."""
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.5])
+    raw = clean
+    for part in (slice(0, 3), slice(3, 6)):
+        raw = changed(raw, "imu", turned(part, turn.as_matrix()))
+    rig = described(clean.rig)
+    assert rig.imu is not None
+    aside = replace(rig.imu, position=rig.imu.position + np.array([1.4, -1.3, 0.1]))
+    (found,) = judge.judged(replace(raw, rig=replace(rig, imu=aside))).found
+    fault, mended = found.fault, found.session.rig
+    assert (fault.effect, fault.where["channel"]) == ("imu_misalignment", "imu")
+    assert fault.corrected
+    assert "orientation:" in fault.correction
+    value, std = (float(str(fault.parameters["angle"][k])) for k in ("value", "std"))
+    assert abs(value - turn.magnitude()) < 3.0 * std < 0.3
+    assert mended.imu is not None
+    true = Rotation.from_quat(rig.imu.orientation) * turn
+    off = true.inv() * Rotation.from_quat(mended.imu.orientation)
+    assert off.magnitude() < 3.0 * mended.tolerance["imu_orientation"]
+    away = np.linalg.norm(mended.imu.position - rig.imu.position)
+    assert away < max(3.0 * mended.tolerance["imu_position"], 0.2)
+
+
+def test_an_imu_that_only_the_second_run_heard_is_held_against_no_other_motion(small: ReducedSession) -> None:
+    """Of runs that differ in length the first one's motion is no measure of the second one's IMU."""
+    first = small.runs[0]
+    longer = {d: np.concatenate([v, v[:PER_SPAN]]) for d, v in first.values.items()}
+    second = replace(
+        first, name="second", values=longer, time=first.kernel * np.arange(float(len(longer["imu"])))
+    )
+    deaf = replace(first, values={d: v for d, v in first.values.items() if d != "imu"})
+    evidence = Evidence(ReducedSession(small.rig, (*small.at_rest, deaf, second)))
+    assert all(h.change is not None for h in judge.proposals(evidence))
+
+
+def test_no_mount_is_sought_where_nothing_moves(clean: RawSession) -> None:
+    """Rest alone tells no heading of an IMU that hangs upside down."""
+    upside_down = changed(clean, "imu", columns(-1.0, slice(3, 6)))
+    resting = tuple(r for r in upside_down.recordings if r.kind == "static")
+    evidence = Evidence(reduced(replace(upside_down, recordings=resting)))
+    assert evidence.bound(frozenset(["imu"])) > 10.0
+    assert list(imu_turned.hypotheses(evidence)) == []
+
+
+def test_a_mount_that_the_motion_does_not_tell_is_not_guessed(small: ReducedSession) -> None:
+    """It is said that the IMU lies otherwise, whose mount it was given, and it is left out."""
+    lies = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_quat()
+    rig, given = small.rig, Mount(np.ones(3), lies)
+    assert rig.exciter is not None
+    copied = replace(rig, imu=given, exciter=replace(rig.exciter, orientation=lies))
+    vague = imu_turned.Found(Mount(np.ones(3), np.array([0.0, 0.0, 0.0, 1.0])), 0.3, 0.1)
+    hypothesis = imu_turned.of_mount(copied, given, vague, moved=True)
+    fault = hypothesis.describe(None)
+    assert (fault.effect, fault.where["mount"]) == ("wiring", "exciter")
+    assert not fault.corrected
+    assert not fault.parameters
+    rest = fit_rest(rig, small.at_rest)
+    assert rest is not None
+    assert hypothesis.fitted is not None
+    assert hypothesis.fitted(rest).left_out == ("imu",)
+    sure = imu_turned.of_mount(copied, given, replace(vague, turn_std=0.02), moved=True)
+    assert sure.fitted is not None
+    right = sure.fitted(rest).rig
+    assert right is not None
+    assert right(copied).tolerance["imu_orientation"] == pytest.approx(0.02)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from session_samples import make_recording, make_rig
 
-from rig_identification.estimate.enough import enough, liveliest, told
+from rig_identification.estimate.enough import enough, liveliest, share_of_std, told
 from rig_identification.estimate.evidence import Run, prepare
 
 
@@ -40,6 +40,20 @@ def test_long_ones_share_the_time_by_their_length() -> None:
 def test_the_stretch_that_moves_most_is_used() -> None:
     part = liveliest(swinging(20.0, (12.0, 16.0)), 4.0)
     assert 11.8 < part.offset < 12.2
+
+
+def test_how_much_of_the_motion_a_stretch_holds_is_known() -> None:
+    """Noise moves nothing: of a swing that stands still outside of a stretch all is in it."""
+    assert liveliest(swinging(20.0, (12.0, 16.0)), 5.0).lively == pytest.approx(1.0, abs=0.02)
+    assert liveliest(swinging(20.0, (0.0, 20.0)), 5.0).lively == pytest.approx(0.25, abs=0.02)
+
+
+def test_more_seconds_narrow_what_noise_decides_and_not_what_is_believed() -> None:
+    """Four times as much halves the first number's std; what belief tells stays; a sum lies between."""
+    believed, told_by_runs = np.diag([1e-9, 4.0]), np.diag([1.0, 1e-9])
+    elements = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    share = share_of_std(believed, told_by_runs, 4.0, elements)
+    assert share == pytest.approx([0.5, 1.0, np.sqrt((0.25 + 0.25) / (1.0 + 0.25))], rel=1e-6)
 
 
 def test_what_is_cut_from_a_cut_run_says_where_it_lies_in_the_recording() -> None:

@@ -220,6 +220,15 @@ def test_both_ends_of_the_range_are_found() -> None:
     np.testing.assert_array_equal(clipped, (signal <= -0.8) | (signal >= 0.9))
 
 
+def test_the_crest_of_a_quick_swing_in_a_coarse_converter_is_no_limit() -> None:
+    """Each step near the crest holds a sample or two: one that holds four by chance is no end of range."""
+    time = np.arange(6000) / 500.0
+    swing = 350.0 * np.sin(2.0 * np.pi * 3.0 * time) * np.exp(-time / 8.0)
+    noisy = [swing + 0.3 * np.random.default_rng(seed).standard_normal(time.size) for seed in range(100)]
+    assert sum(bool(limits(np.round(one)[:, None])) for one in noisy) <= 3
+    assert all(limits(np.round(np.minimum(one, 300.0))[:, None]) for one in noisy[:20])
+
+
 def test_what_is_left_of_a_clipped_signal_has_its_scale() -> None:
     """Of what lies near the limit noise decides what is stuck: the rest alone reads a scale too small."""
     signal, std = SINE, 0.15

@@ -18,8 +18,9 @@ _RUN = 4
 #: Fewer distinct values than this: a resting or coarse signal, whose extreme is no limit.
 _DISTINCT = 16
 #: The crest of a sine in a coarse converter holds up to 1 / (sqrt(2) - 1) = 2.4 times the samples of the step
-#: below.
-_CREST = 4
+#: below. Where each step holds one or two samples chance makes more of it: it is held against the fullest of
+#: some steps.
+_CREST, _BELOW = 4, 4
 #: Samples whose mean is the signal itself, next to their noise.
 _SMOOTHED = 5
 #: Std of the noise within which of a limit it decides what is stuck.
@@ -42,8 +43,8 @@ def limits(values: NDArray[np.float64]) -> list[Limit]:
     """Ends of range at which the signal is stuck, from the signal alone.
 
     A column is clipped where it holds its largest or smallest value exactly over several consecutive samples
-    and that value is far more common than the next one. Exactly 0 is no limit: a slack cable and an idle
-    exciter read it.
+    and that value is far more common than any of the next ones. Exactly 0 is no limit: a slack cable and an
+    idle exciter read it.
 
     Parameters
     ----------
@@ -57,7 +58,9 @@ def limits(values: NDArray[np.float64]) -> list[Limit]:
         levels, counts = np.unique(column, return_counts=True)
         if len(levels) < _DISTINCT:
             continue
-        for level, count, below in ((levels[0], counts[0], counts[1]), (levels[-1], counts[-1], counts[-2])):
+        ends = ((levels[0], counts[: _BELOW + 1]), (levels[-1], counts[: -_BELOW - 2 : -1]))
+        for level, (count, *others) in ends:
+            below = max(others)
             stuck = column == level
             if level != 0.0 and count >= max(_RUN, _CREST * below) and _longest_run(stuck) >= _RUN:
                 reached = stuck | _within_reach(column, float(level), stuck, upper=level == levels[-1])

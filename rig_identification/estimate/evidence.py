@@ -157,6 +157,7 @@ class Run:
     offset: float = 0.0  # s after the recording's start at which node 0 lies
     unknown: tuple[tuple[float, float], ...] = ()  # stretches (s) whose force is not known (force_gaps.py)
     out_of: float = 0.0  # s of the run of which this is the liveliest stretch (enough.py); 0: it is not cut
+    lively: float = 1.0  # share of that whole run's motion that is in the stretch
     turning: Turning | None = None  # by which turn a tracker's error goes, where it does
 
     @cached_property

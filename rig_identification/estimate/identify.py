@@ -12,7 +12,7 @@ from rig_identification.errors import InputError
 from rig_identification.estimate import noise_at_rest
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits, run_motion
-from rig_identification.estimate.enough import enough, told
+from rig_identification.estimate.enough import enough, loss_told, told
 from rig_identification.estimate.estimates import parameter_estimates
 from rig_identification.estimate.evidence import Run, away_from_jumps, prepare
 from rig_identification.estimate.first_guess import (
@@ -632,6 +632,7 @@ def compose(
         notes += (TIED,)
     total, headings = whichever_way(*basis, total)
     notes += (headings,) if headings else ()
+    notes += loss_told(*basis, total)
     total = with_sources(total, *basis, loose)
     tied = tied_note(total) if only_watched(fitted.problem) else None
     notes += () if tied is None else (tied,)

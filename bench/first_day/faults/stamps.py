@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 
 from bench.first_day.faults.base import Case, Injector, cells, devices, on, picked
 from rig_identification.raw import RawChannel, RawSession
@@ -39,7 +40,7 @@ def cases(raw: RawSession) -> Iterator[Case]:
     for place, names in _places(raw, held):
         yield from _written(place, names)
         yield from _clocks(place, names)
-        yield from _arrivals(place, names)
+        yield from _arrivals(raw, place, names)
         yield from _unset(place, names)
     yield from _written("all", everything)
     yield from _unset("all", everything)
@@ -159,7 +160,33 @@ def _drifting(ppm: float) -> StampLaw:
     return restamped(law)
 
 
-def _arrivals(place: str, names: tuple[str, ...]) -> Iterator[Case]:
+#: Nats that a device's readings have to tell of its stamps before anything could: one in ten.
+TELLS = float(np.log(10.0))
+#: s over which a reading's rate of change is taken.
+SMOOTH = 0.5
+
+
+def _late_by(raw: RawSession, names: tuple[str, ...], spread: float) -> float:
+    """Nats that readings tell of stamps late by ``spread`` s (std): what they change by it over noise."""
+    told = 0.0
+    for channel in (c for r in raw.recordings for c in r.channels if c.device in names):
+        step = float(np.median(np.diff(channel.stamp_ns))) / SECOND
+        window = max(5, round(SMOOTH / step) | 1)
+        if len(channel.values) <= window:
+            continue
+        rate = savgol_filter(channel.values, window, 2, deriv=1, delta=step, axis=0)
+        noise = np.sqrt(np.mean(np.diff(channel.values, n=2, axis=0) ** 2, axis=0) / 6.0)
+        told += 0.5 * float(np.sum((spread * rate / np.maximum(noise, 1e-12)) ** 2))
+    return told
+
+
+def _slower(raw: RawSession, names: tuple[str, ...], interval: float) -> bool:
+    """Whether the devices measure more seldom than a driver hands over: samples come one by one."""
+    steps = [np.median(np.diff(c.stamp_ns)) for r in raw.recordings for c in r.channels if c.device in names]
+    return bool(np.min(steps) > interval * SECOND)
+
+
+def _arrivals(raw: RawSession, place: str, names: tuple[str, ...]) -> Iterator[Case]:
     for jitter in JITTERS:
         variant = f"{1000 * jitter:g}_ms"
         yield stamp_case("arrival_time", place, variant, names, on(names, _arrived(jitter)))
@@ -168,8 +195,11 @@ def _arrivals(place: str, names: tuple[str, ...]) -> Iterator[Case]:
         yield stamp_case("jitter", place, variant, names, on(names, _uneven(spread)), jitter=spread)
     for interval in BURSTS:
         variant = f"{1000 * interval:g}_ms"
-        # What is slower than the bursts comes one by one: that is arrival time
-        yield stamp_case("usb_bursts", place, variant, names, on(names, _burst(interval)))
+        # What is slower than the bursts comes one by one: stamps alone do not tell it from a device that
+        # measures at every second or third tick of a quicker clock. Its readings do, where they change
+        idle = _slower(raw, names, interval) and _late_by(raw, names, interval / np.sqrt(12.0)) < TELLS
+        untellable = "its readings hardly change in the time by which its stamps are off" if idle else ""
+        yield stamp_case("usb_bursts", place, variant, names, on(names, _burst(interval)), untellable)
 
 
 HANDED_ON = 200_000  # ns from the stamp to the recorder

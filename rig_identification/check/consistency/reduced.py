@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,17 +187,16 @@ def _window(series: Mapping[str, tuple[Array, Array]], start: float) -> tuple[fl
     ends = sorted((t[-1] - start) * 1e-9 for t, _ in series.values())
     begin, end = begins[len(begins) // 2], ends[len(ends) // 2]
     count = max(1, int((end - begin) // WINDOW))
-    best, most = begin, -1.0
-    for k in range(count):
-        first = begin + k * WINDOW
-        share = 0.0
-        for t, rows in series.values():
-            inside = (t >= start + first * 1e9) & (t < start + (first + WINDOW) * 1e9)
-            if np.count_nonzero(inside) > 2:
-                whole, here = _variance(rows), _variance(rows[inside])
-                share += float(np.sum(here / np.where(whole > 0.0, whole, np.inf)))
-        if share > most + 1e-9:
-            best, most = first, share
+    edges = begin + WINDOW * np.arange(count + 1)
+    share = np.zeros(count)
+    for t, rows in series.values():
+        whole = _variance(rows)
+        whole = np.where(whole > 0.0, whole, np.inf)
+        at = np.searchsorted(t, start + 1e9 * edges)
+        for k, (a, b) in enumerate(pairwise(at)):
+            if b - a > 2:
+                share[k] += float(np.sum(_variance(rows[a:b]) / whole))
+    best = begin + WINDOW * int(np.argmax(share))
     return best, min(best + WINDOW, end)
 
 

@@ -58,7 +58,9 @@ class TrackerModel:
         middle = turns.mean()
         q = (turns * middle.inv()).as_rotvec()
         if self.motion is None:
-            return min(self._by_cables(d, q, R) for R in self._attitudes(None, q))
+            attitudes = self._attitudes(None, q)
+            nats = self._by_cables(np.hstack([d, q]), np.array(attitudes))
+            return min(float(one) + slanted(R) for one, R in zip(nats, attitudes, strict=True))
         x, w = self._world(known)
         return min(self._by_motion(d, q, x, w, R) for R in self._attitudes(w, q))
 
@@ -92,50 +94,77 @@ class TrackerModel:
         spread = np.concatenate([np.std(d @ R, axis=0), np.std(q @ R, axis=0)])
         return self._nats(left, spread) + slanted(R)
 
-    def _by_cables(self, d: Array, q: Array, R: Array) -> float:
-        """Nats for one attitude: what stretches the cables."""
-        moved, turn = d @ R, q @ R
+    def _by_cables(self, z: Array, R: Array) -> Array:
+        """(h,) nats for attitudes R (h, 3, 3): what stretches the cables, the marker's arm fitted to each.
+
+        z: (N, 6) displacement and turn, tracker axes. All that is left is linear in them: their moments do.
+        """
+        whole_turn = np.zeros((len(R), 6, 6))
+        whole_turn[:, :3, :3] = whole_turn[:, 3:, 3:] = R
+        mean = z.mean(axis=0) @ whole_turn  # (h, 6), world axes
+        square = np.swapaxes(whole_turn, 1, 2) @ (z.T @ z / len(z)) @ whole_turn  # (h, 6, 6)
         hinges = np.array([c.body_point for c in self.rig.cables]) @ self.R0.T
         span = np.array([c.ceiling_point for c in self.rig.cables]) - self.position - hinges
         unit = span / np.linalg.norm(span, axis=1, keepdims=True)
-        stretch = moved @ unit.T + turn @ np.cross(hinges, unit).T
-        rows = np.cross(unit[None], turn[:, None, :])  # (N, n, 3): by the marker's arm
-        arm = self._arm_of(rows.reshape(-1, 3), stretch.reshape(-1))
-        left = stretch - rows @ arm
-        whole = float(np.sqrt(np.mean(moved**2) + np.mean(turn**2) * np.mean(hinges**2)))
+        stretch = np.concatenate([unit, np.cross(hinges, unit)], axis=1)  # (n, 6)
+        by_arm = -np.swapaxes(skew(unit), 1, 2)  # (n, 3, 3): stretch by the arm's axes times the turn
+        turned = square[:, 3:]
+        rows = np.einsum("nka,hab,nlb->hkl", by_arm, turned[:, :, 3:], by_arm) * len(z)
+        right = np.einsum("nka,hab,nb->hk", by_arm, turned, stretch) * len(z)
+        miss = np.mean(mean @ stretch.T, axis=1)
+        spread = np.sqrt(np.maximum(np.mean(_forms(stretch, square), axis=1) - miss**2, 0.0))
+        arm = self._arms(rows, right, spread)
+        left = np.tile(stretch, (len(R), 1, 1))
+        left[:, :, 3:] -= np.einsum("hk,nka->hna", arm, by_arm)
+        moved, turn = (float(np.trace(square[0, part, part])) for part in (slice(0, 3), slice(3, 6)))
+        whole = float(np.sqrt((moved + turn * np.mean(hinges**2)) / 3.0))
         blur = self._second_order(moved, turn, hinges, np.linalg.norm(span, axis=1))
-        return self._nats(left, np.full(unit.shape[0], whole), blur) + slanted(R)
+        return self._missed(_forms(left, square) + blur**2, np.full(len(unit), whole), self._floor(0))
 
     @staticmethod
-    def _second_order(moved: Array, turn: Array, hinges: Array, length: Array) -> Array:
+    def _second_order(moved: float, turn: float, hinges: Array, length: Array) -> Array:
         """(n,) m: what a cable keeps of its length in the second order, which rows of the first order lack.
 
         A hinge that moves by s lies on a sphere, s^2/2L off its tangent; a turn by q brings a point at h
         q^2 h/2 back. Less than this no pose is known to miss: a body on two parallel cables, whose motion
-        hardly stretches them in the first order, would be judged by it alone.
+        hardly stretches them in the first order, would be judged by it alone. moved, turn: mean squares.
         """
         arm = np.linalg.norm(hinges, axis=1)
-        turned = np.mean(np.sum(turn**2, axis=1))
-        swing = np.mean(np.sum(moved**2, axis=1)) + turned * arm**2
-        return np.asarray(0.5 * (swing / length + turned * arm))
+        return np.asarray(0.5 * ((moved + turn * arm**2) / length + turn * arm))
 
     def _arm_of(self, rows: Array, miss: Array) -> Array:
-        span = max(float(np.ptp([c.body_point for c in self.rig.cables], axis=0).max()), 0.1)
-        reach = REACH * span
-        std = ORDINARY * max(float(np.std(miss)), FLOOR[0])
-        normal = rows.T @ rows / std**2 + np.eye(3) / reach**2
-        return np.asarray(np.linalg.solve(normal, rows.T @ miss / std**2))
+        normal, right = (rows.T @ rows)[None], (rows.T @ miss)[None]
+        return np.asarray(self._arms(normal, right, np.array([np.std(miss)]))[0])
 
-    def _nats(self, left: Array, spread: Array, blur: Array | float = 0.0) -> float:
-        """Nats by which ``left`` is missed. blur: error of the model itself, beside what is left."""
-        floor = np.repeat(FLOOR, [3, left.shape[1] - 3]) if left.shape[1] == 6 else FLOOR[0]
-        noise = (self.rig.noise.get("mocap_position", 0.0), self.rig.noise.get("mocap_orientation", 0.0))
-        floor = np.maximum(floor, np.repeat(noise, [3, 3]) if left.shape[1] == 6 else noise[0])
+    def _arms(self, normal: Array, right: Array, spread: Array) -> Array:
+        """(h, 3) m, least squares held near the datum. normal: (h, 3, 3); right: (h, 3); spread: (h,)."""
+        span = max(float(np.ptp([c.body_point for c in self.rig.cables], axis=0).max()), 0.1)
+        weight = (ORDINARY * np.maximum(spread, FLOOR[0])) ** -2.0
+        held = normal * weight[:, None, None] + np.eye(3) / (REACH * span) ** 2
+        return np.asarray(np.linalg.solve(held, (right * weight[:, None])[:, :, None])[:, :, 0])
+
+    def _nats(self, left: Array, spread: Array) -> float:
+        """Nats by which ``left`` (N, 6), displacements and turns, is missed."""
+        floor = np.repeat([self._floor(0), self._floor(1)], 3)
+        return float(self._missed(np.mean(left**2, axis=0)[None], spread, floor)[0])
+
+    def _floor(self, part: int) -> float:
+        """Smallest displacement (m) or turn (rad) that tells anything."""
+        noise = self.rig.noise.get(("mocap_position", "mocap_orientation")[part], 0.0)
+        return max(FLOOR[part], noise)
+
+    @staticmethod
+    def _missed(square: Array, spread: Array, floor: Array | float) -> Array:
+        """(h,) nats of mean squares (h, k) that are left of readings of std ``spread`` (k,)."""
         whole = np.sqrt(np.mean(spread**2))
         std = np.sqrt(floor**2 + (ORDINARY * spread) ** 2 + (ACROSS * whole) ** 2)
-        return float(
-            np.sum(nats((np.mean(left**2, axis=0) + blur**2) / std**2, std / np.maximum(spread, TINY)))
-        )
+        sharpness = std / np.maximum(spread, TINY)
+        return np.array([float(np.sum(nats(one / std**2, sharpness))) for one in square])
+
+
+def _forms(rows: Array, square: Array) -> Array:
+    """(h, n) mean squares of rows (n, 6), or (h, n, 6), times what has second moments (h, 6, 6)."""
+    return np.asarray(np.sum((rows @ square) * rows, axis=2))
 
 
 def slanted(R: Array) -> float:

@@ -59,8 +59,9 @@ def signed_permutations(size: int) -> list[Array]:
 def _likely_rates(evidence: Evidence) -> list[Array]:
     """Permutations of the gyroscope nearest to the rate of a motion that is found without it, or with it."""
     rig = evidence.session.rig
-    runs = [r for r in evidence.session.runs if "imu" in r.values]
-    if rig.imu is None or not runs or not evidence.plain.motions:
+    runs = evidence.session.runs
+    # Of the first run alone a motion is known
+    if rig.imu is None or not runs or "imu" not in runs[0].values or not evidence.plain.motions:
         return []
     R_imu = rotation(rig.imu)
     found = []
