@@ -232,7 +232,7 @@ def _settled(
         if budget.spent():
             break
         notify("search: which effects together")
-        again = _together(base, problem, evaluation, choice)
+        again = together(base, problem, evaluation, choice)
         if again.labels in seen:
             break
         seen.add(again.labels)
@@ -314,7 +314,7 @@ def _best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Cand
     return list(best.values())
 
 
-def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
+def together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
     """Which effects belong into the model, by what all at once promise about a fit with some (subsets.py).
 
     base: without any effect; problem, evaluation: the fit with those of ``choice``.

@@ -29,6 +29,7 @@ from rig_identification.mismatch.hands import hand_finding, nobody_held
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Choice, Notify, damped, exchanged
+from rig_identification.mismatch.swing_near_noise import Whole, likeliest_near_noise
 from rig_identification.mismatch.threads import physics_of_pendulums
 from rig_identification.mismatch.tracker_error import tracker_findings
 from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, may_be_none
@@ -123,8 +124,20 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     heavy, point = _begun_whole(ideal, *careful)
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
     fitted = _scored(ideal, heavy, whole, converged)
-    evidence_of_all = log_evidence(whole)
-    found = [Trial(c, heavy, whole, evidence_of_all, True) for c in _sure(choice.effects, careful)]
+    sure = _sure(choice.effects, careful)
+    bare = replace(ideal.problem, bench=known.bench)
+    first = Whole(choice, fitted.problem, fitted.evaluation, converged)
+
+    def refined(trial: Trial) -> tuple[Problem, Evaluation]:
+        return _tempered(*solve_cautiously(replace(trial.problem, runs=raw.runs), trial.evaluation.point))
+
+    likelier = likeliest_near_noise(bare, first, ideal.rest, refined, budget)
+    if likelier is not None:
+        changed, parted = exchanged(parts, *careful, choice, likelier.choice)
+        careful = _tempered(*solve_cautiously(replace(changed, runs=raw.runs), parted.point))
+        choice, heavy, whole = likelier.choice, likelier.problem, likelier.evaluation
+        fitted, sure = _scored(ideal, heavy, whole, likelier.converged), choice.effects
+    found = [Trial(c, heavy, whole, log_evidence(whole), True) for c in sure]
     after, verdict = judged(fitted)
     told = estimates(fitted.problem, fitted.evaluation, spread=careful[1])
     evidence = evidence_of(found_ideal, fitted, after.holdout)
