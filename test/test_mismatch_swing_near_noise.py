@@ -9,12 +9,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.first_guess import rest_of
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.launch import launch_states
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
@@ -54,12 +56,12 @@ class Turning:
             "turning",
             rig,
             BODY,
-            (RunSpec("run_1", 30.0, start),),
+            (RunSpec("run_1", 30.0, start), RunSpec("run_2", 15.0, start, holdout=True)),
             rates=SampleRates(0.0, 0.0, 0.0, 20.0, 0.0, 0.0, 0.0),
             effects={"hinge_damping": (DAMPING,)},
         )
         session = simulate_session(spec, np.random.default_rng(4))[0]
-        self.bare: Problem = pose_problem(session)[0]
+        self.bare, _, self.held = pose_problem(session)
         parameters = self.bare.bench.parameters
         theta = np.concatenate([parameters.start(BODY)[:INERTIAL], np.zeros(parameters.size - INERTIAL)])
         self.rest = rest_of(model_at(parameters, theta))
@@ -86,10 +88,14 @@ class Turning:
         problem, begun = self.begun(self.laws[name])
         return Whole(self.choice(name, behind), problem, *solve(problem, begun.point, tolerance=0.1))
 
+    def predicted(self, model: Whole) -> Fitted:
+        """A model and what it predicts of the held-out run."""
+        runs, held, lost = predicted(model.problem, self.held, model.evaluation.point.theta, self.rest)
+        assert not lost
+        return Fitted(model.problem, model.evaluation, model.converged, self.rest, runs, held)
+
     def likeliest(self, first: Whole) -> Whole | None:
-        return likeliest_near_noise(
-            self.bare, first, self.rest, lambda trial: (trial.problem, trial.evaluation), UNLIMITED
-        )
+        return likeliest_near_noise(self.bare, first, self.rest, self.predicted, UNLIMITED)
 
 
 @pytest.fixture(scope="module")
@@ -116,8 +122,9 @@ def test_nothing_is_asked_far_from_the_noise(turning: Turning) -> None:
     problem, begun = turning.begun(turning.laws[SQUARE])
     assert misfit(begun) > NEAR_SQUARE
 
-    def never(trial: Trial) -> tuple[Problem, Evaluation]:
-        raise AssertionError(trial.candidate.label)
+    def never(model: Whole) -> Fitted:
+        raise AssertionError(model.choice.labels)
 
     first = Whole(turning.choice(SQUARE, 3.0), problem, begun, converged=False)
-    assert likeliest_near_noise(turning.bare, first, turning.rest, never, UNLIMITED) is None
+    asked = likeliest_near_noise(turning.bare, first, turning.rest, never, UNLIMITED)
+    assert asked is None

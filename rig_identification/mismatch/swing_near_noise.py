@@ -6,8 +6,10 @@ part over a whole run, where the swing is wide at first and small at the end. On
 the swing that nothing sees until the fitted runs are followed, and misses every other run.
 
 So where whole runs come near the noise, and what is left is small, the laws that hardly trailed in pieces are
-fitted to whole runs as well, and about each of these fits all effects are chosen from anew. The likeliest of
-all is taken. Each channel has its sensor's own noise there: evidence compares fits to the same samples alone.
+fitted to whole runs as well, and about each of these fits all effects are chosen from anew. Of those that the
+fitted runs hardly tell apart the one is taken for which all runs say most, held-out ones among them, as of
+close rivals elsewhere (search/whole.py). Each channel has its sensor's own noise there, for evidence compares
+fits to the same samples alone.
 """
 
 from __future__ import annotations
@@ -17,11 +19,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import NEAR_SQUARE, misfit, settled_starts
-from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.launch import launch_states
+from rig_identification.estimate.observability import believed_point
+from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Point, Problem, solve
+from rig_identification.estimate.verdict import held_out_densities
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import needed_gain
+from rig_identification.mismatch.screen import extended
 from rig_identification.mismatch.swing_effects import Choice, exchanged, together
 from rig_identification.mismatch.trial import Trial, log_evidence, may_be_none
 from rig_identification.model.motion import State
@@ -58,13 +65,13 @@ def likeliest_near_noise(
     bare: Problem,
     first: Whole,
     rest: State,
-    refined: Callable[[Trial], tuple[Problem, Evaluation]],
+    predicted: Callable[[Whole], Fitted],
     budget: Budget,
 ) -> Whole | None:
-    """The likeliest model of the whole runs; None where ``first`` is, or leaves more than noise.
+    """The likeliest model of all runs; None where ``first`` is, or leaves more than noise.
 
     bare: whole runs without any effect. first: the choice of the pieces, wherever its fit stands. rest: how
-    the body hangs. refined: the cautious fit of one law in pieces, from which its fit to whole runs starts.
+    the body hangs. predicted: what a model makes of the held-out runs.
     """
     if misfit(first.evaluation) >= NEAR_SQUARE or first.choice.holding:
         return None
@@ -75,13 +82,31 @@ def likeliest_near_noise(
         if budget.spent():
             break
         try:
-            weights, evaluation = refined(trial)
-            models.append(_fitted(bare, _alone(first.choice, trial), weights, evaluation.point, rest))
+            models.append(_fitted(bare, first.choice, trial, rest))
         except (FloatingPointError, np.linalg.LinAlgError):
             continue
-    found = [_chosen_anew(bare, model, budget) for model in models]
-    best = max((m for m in (first, *found) if m is first or m.there), key=lambda m: m.score)
+    found = [m for model in models for m in _chosen_anew(bare, model, budget) if m is first or m.there]
+    best = _for_which_all_runs_say_most(found, predicted)
     return None if best.choice.labels == first.choice.labels else best
+
+
+def _for_which_all_runs_say_most(models: list[Whole], predicted: Callable[[Whole], Fitted]) -> Whole:
+    """Of the models that the fitted runs hardly tell apart the one that predicts the held-out runs likeliest.
+
+    A run that one of them cannot follow tells nothing of the others.
+    """
+    highest = max(m.score for m in models)
+    close: dict[tuple[str, ...], Whole] = {}
+    for m in sorted(models, key=lambda m: -m.score):
+        if highest - m.score < CLOSE:
+            close.setdefault(m.choice.labels, m)
+    rivals = list(close.values())
+    if len(rivals) == 1:
+        return rivals[0]
+    held = [held_out_densities(predicted(m)) for m in rivals]
+    followed = set.intersection(*(set(densities) for densities in held))
+    said = [m.score + sum(of[key] for key in followed) for m, of in zip(rivals, held, strict=True)]
+    return rivals[int(np.argmax(said))]
 
 
 def _close(choice: Choice) -> list[Trial]:
@@ -96,23 +121,28 @@ def _close(choice: Choice) -> list[Trial]:
     ]
 
 
-def _alone(choice: Choice, trial: Trial) -> Choice:
-    return replace(choice, chosen=(trial.candidate,))
+def _fitted(bare: Problem, choice: Choice, trial: Trial, rest: State) -> Whole:
+    """Whole runs with one law, begun at its amount in pieces and at the body and the rig as believed.
 
-
-def _fitted(bare: Problem, choice: Choice, weights: Problem, point: Point, rest: State) -> Whole:
-    """Whole runs with a choice of effects. weights, point: the same in pieces, from which the fit starts."""
-    problem = replace(bare, bench=weights.bench, weak_center=weights.weak_center)
-    starts = tuple(launch_state(problem.bench, run, point.theta, rest) for run in problem.runs)
-    begun = Point(point.theta, starts, point.rest_guesses)
+    Pieces bend a body, and a swing that nothing sees, to what they lack: a whole run that begins there stays
+    in that valley.
+    """
+    problem = extended(bare, (trial.candidate,))
+    parameters, pieces = problem.bench.parameters, trial.evaluation.point.theta
+    theta = np.zeros(parameters.size)
+    theta[:INERTIAL] = believed_point(trial.problem, trial.evaluation)[:INERTIAL]
+    for p in trial.candidate.parameters:
+        theta[parameters.index_of(p.name)] = pieces[trial.problem.bench.parameters.index_of(p.name)]
+    starts = launch_states(problem.bench, problem.runs, theta, rest)
+    begun = Point(theta, starts, trial.evaluation.point.rest_guesses)
     begun = replace(begun, starts=settled_starts(problem, begun))
     evaluation, converged = solve(problem, begun, iterations=STEPS, tolerance=0.1)
-    return Whole(choice, problem, evaluation, converged)
+    return Whole(replace(choice, chosen=(trial.candidate,)), problem, evaluation, converged)
 
 
-def _chosen_anew(bare: Problem, model: Whole, budget: Budget) -> Whole:
-    """The likeliest of a model and of those that its own linearisation leads to, one after the other."""
-    best, seen = model, {model.choice.labels}
+def _chosen_anew(bare: Problem, model: Whole, budget: Budget) -> list[Whole]:
+    """A model, and those that its own linearisation leads to, one after the other."""
+    out, seen = [model], {model.choice.labels}
     for _ in range(ROUNDS):
         if budget.spent():
             break
@@ -126,5 +156,5 @@ def _chosen_anew(bare: Problem, model: Whole, budget: Budget) -> Whole:
         except (FloatingPointError, np.linalg.LinAlgError):
             break
         model = Whole(again, problem, evaluation, converged)
-        best = max(best, model, key=lambda m: m.score)
-    return best
+        out.append(model)
+    return out

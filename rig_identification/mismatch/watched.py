@@ -128,10 +128,10 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     bare = replace(ideal.problem, bench=known.bench)
     first = Whole(choice, fitted.problem, fitted.evaluation, converged)
 
-    def refined(trial: Trial) -> tuple[Problem, Evaluation]:
-        return _tempered(*solve_cautiously(replace(trial.problem, runs=raw.runs), trial.evaluation.point))
+    def predicting(model: Whole) -> Fitted:
+        return _scored(ideal, model.problem, model.evaluation, model.converged)
 
-    likelier = likeliest_near_noise(bare, first, ideal.rest, refined, budget)
+    likelier = likeliest_near_noise(bare, first, ideal.rest, predicting, budget)
     if likelier is not None:
         changed, parted = exchanged(parts, *careful, choice, likelier.choice)
         careful = _tempered(*solve_cautiously(replace(changed, runs=raw.runs), parted.point))
