@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.cautious import once, reweighted, solve_cautiously
+from rig_identification.estimate.cautious import left_beyond_noise, once, reweighted, solve_cautiously
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
@@ -155,7 +155,8 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
         mismatch = Mismatch("unexplained", text, tuple(findings), choice.rivals)
     hidden = {name for t in found for name in t.candidate.hides}
-    lost = hidden | set(testimony(*careful, _missed(fitted)))
+    left = left_beyond_noise(careful[0], raw.runs, careful[1])
+    lost = hidden | set(testimony(*careful, _missed(fitted), left))
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
 
 
