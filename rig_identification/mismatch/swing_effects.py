@@ -196,7 +196,7 @@ def damped(
     def told(share: float) -> Callable[[str], None]:
         return lambda stage: notify(stage, share)
 
-    kinds = _best_of_each_kind(base, evaluation, dampers)
+    kinds = best_of_each_kind(base, evaluation, dampers)
     tried = _better(base, evaluation, kinds, count, told(0.2), budget)
     if not tried:
         return None
@@ -297,7 +297,7 @@ def _all_at_once(
     )
 
 
-def _best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Candidate]) -> list[Candidate]:
+def best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Candidate]) -> list[Candidate]:
     """Of each effect the candidate that gains most to first order, where that comes near the best of all.
 
     base, evaluation: a fit without any effect.
