@@ -27,8 +27,7 @@ from rig_identification.estimate.solve import (
     shortened,
     solve,
 )
-from rig_identification.estimate.start_state import fit_start, likeliness_cost
-from rig_identification.estimate.unseen_swing import CALM
+from rig_identification.estimate.start_state import fit_start
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -145,23 +144,7 @@ def settled_starts(problem: Problem, point: Point) -> tuple[State, ...]:
 
 
 def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tuple[Linearised, State] | None:
-    """A held-out run's start state over growing horizons.
-
-    Where nothing tells how the body swings beside a turn it is followed hardly swinging first as well.
-    """
-    free = _fit_start_growing(bench, run, theta, start)
-    if not bench.unseen or bench.calm < 1.0:
-        return free
-    calm = _fit_start_growing(replace(bench, calm=CALM), run, theta, start)
-    if calm is None:
-        return free
-    calm = fit_start(bench, run, theta, calm[1], tolerance=1e-3, polish=POLISH)
-    found = [one for one in (calm, free) if one is not None]
-    return min(found, key=lambda one: likeliness_cost(bench, theta, *one)) if found else None
-
-
-def _fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tuple[Linearised, State] | None:
-    """The same from one ``start`` alone."""
+    """A held-out run's start state over growing horizons."""
     result = None
     for end in horizons(run.grid.duration):
         whole = end >= run.grid.duration

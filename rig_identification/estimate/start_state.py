@@ -134,12 +134,6 @@ def fit_start(
     return current, start
 
 
-def likeliness_cost(bench: Bench, theta: Array, run: Linearised, start: State) -> float:
-    """Cost (nats) of a run from its ``start``, with what is believed of a swing that nothing measures."""
-    belief = _belief(bench, model_at(bench.parameters, theta), start)[0]
-    return run.cost + float(np.sum(belief))
-
-
 def _belief(bench: Bench, model: RigModel, start: State) -> tuple[float, Array | float, Array | float]:
     """Cost, information and negative gradient of what is believed of a swing that nothing measures."""
     if not bench.unseen:

@@ -7,8 +7,8 @@ the swing that nothing sees until the fitted runs are followed, and misses every
 
 So where whole runs come near the noise, and what is left is small, the laws that hardly trailed in pieces are
 fitted to whole runs as well, and about each of these fits all effects are chosen from anew. Which of them is
-taken, all runs say (swing_whole.py). Where one turn is all that is measured, pieces are not asked at all: even
-the swing's damping is too little within one, beside a start and a swing that nothing sees.
+taken, all runs say (swing_whole.py). Where one turn is all that is measured, pieces are not asked at all: what
+damps the turn is too little within one, beside a start and a swing that nothing sees.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ ASKEW = slice(4, INERTIAL)
 #: Amounts, in units of its prior's std, of which the likeliest is where the fit of a law of the turn begins.
 AMOUNTS = tuple(float(a) for a in np.geomspace(1e-4, 1.0, 13))
 #: Models of the turn alone that are fitted with all of it free, likeliest first, and steps of each fit.
-FREED, FREED_STEPS = 2, 40
+FREED, FREED_STEPS = 2, 20
 
 
 def near_noise_models(bare: Problem, first: Whole, rest: State, budget: Budget) -> list[Whole]:
@@ -138,7 +138,8 @@ def models_of_one_turn(
     models = chosen_anew(straight, Whole(choice, first.problem, first.evaluation, converged), budget)
     models = sorted((m for m in models if m.there), key=lambda m: -m.score)
     notify("search: whole runs", 0.6)
-    return [f for m in models[:FREED] for f in _freed(bare, m)]
+    models = [_from_believed(m, at, ideal.rest, begun.rest_guesses) for m in models[:FREED]]
+    return [f for m in models for f in _freed(bare, m)]
 
 
 def _begun_straight(
@@ -148,17 +149,12 @@ def _begun_straight(
     rest: State,
     guesses: tuple[State, ...],
 ) -> tuple[Problem, Point]:
-    """The turn alone with one law of the likeliest of some AMOUNTS, each start as the first swings have it.
-
-    Starts that fit a whole run with too little damping are as wrong as that, and a fit stays in that valley.
-    """
+    """The turn alone with one law of the likeliest of some AMOUNTS, each start as the first swings have it."""
     problem = extended(straight, (candidate,))
     parameters = problem.bench.parameters
     theta = np.zeros(parameters.size)
     theta[:INERTIAL] = at
-    first = replace(problem, runs=tuple(run.until(long_enough(run, 0.0)) for run in problem.runs))
-    point = Point(theta, launch_states(problem.bench, problem.runs, theta, rest), guesses)
-    point = replace(point, starts=settled_starts(first, point))
+    point = _started(problem, theta, rest, guesses)
     amount = parameters.index_of(candidate.parameters[0].name)
     tried = []
     for value in AMOUNTS:
@@ -168,6 +164,38 @@ def _begun_straight(
         if there is not None:
             tried.append(there)
     return problem, min(tried, key=lambda e: e.cost).point if tried else point
+
+
+def _started(problem: Problem, theta: NDArray[np.float64], rest: State, guesses: tuple[State, ...]) -> Point:
+    """A point with the start of each run as its first swings have it.
+
+    Starts that fit a whole run with too little damping are as wrong as that, and a fit stays in that valley.
+    """
+    first = replace(problem, runs=tuple(run.until(long_enough(run, 0.0)) for run in problem.runs))
+    point = Point(theta, launch_states(problem.bench, problem.runs, theta, rest), guesses)
+    return replace(point, starts=settled_starts(first, point))
+
+
+def _from_believed(model: Whole, at: NDArray[np.float64], rest: State, guesses: tuple[State, ...]) -> Whole:
+    """A model of the turn alone fitted from the body and the rig as believed, where that is likelier.
+
+    Laws that were exchanged on the way have bent both; of their amounts little is left to find.
+    """
+    parameters = model.problem.bench.parameters
+    theta = np.zeros(parameters.size)
+    theta[:INERTIAL] = at
+    for c in model.choice.effects:
+        for p in c.parameters:
+            i = parameters.index_of(p.name)
+            theta[i] = model.evaluation.point.theta[i]
+    try:
+        point = _started(model.problem, theta, rest, guesses)
+        evaluation, converged = solve(model.problem, point, iterations=STEPS, tolerance=0.1)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return model
+    if log_evidence(evaluation) <= log_evidence(model.evaluation):
+        return model
+    return replace(model, evaluation=evaluation, converged=converged)
 
 
 def _everywhere_alike(candidate: Candidate) -> bool:
@@ -194,8 +222,8 @@ def _straight(problem: Problem, at: NDArray[np.float64]) -> Problem:
 def _freed(bare: Problem, model: Whole) -> list[Whole]:
     """A model of the turn alone with the body and its swing as free as in ``bare``: as it stands, and fitted.
 
-    A body that hangs straight and does not swing is where a fit with all of it free may stay as well: to
-    either side of it what it gains is first order in nothing. Which of both is likelier, all runs say.
+    To either side of a body that hangs straight what a fit gains may be next to nothing, and far away it may bend
+    to noise. Which of both is likelier, all runs say.
     """
     bench = replace(model.problem.bench, calm=bare.bench.calm)
     problem = replace(model.problem, bench=bench, weak=bare.weak, weak_center=bare.weak_center)
