@@ -218,7 +218,7 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
 
 
 def _as_believed(problem: Problem, found: Scanned) -> Scanned | None:
-    """The body as believed, as large as the formula of the textbooks makes it, where one turn is all there is.
+    """The body as believed, as large as the textbooks' formula makes it, where one turn is all there is.
 
     None elsewhere, or on a rig without such a formula. The turn alone says no more of a body than that, and a
     scan of one piece bends its shape, and a swing that nothing sees, to what damps the turn.

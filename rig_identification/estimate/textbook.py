@@ -69,7 +69,7 @@ def _inertia(threads: AlikeThreads, mass: float, gravity: float, frequency: floa
 
 
 def _free_turns(problem: Problem, threads: AlikeThreads) -> list[FreeSwing]:
-    """Swings about the vertical of the runs without an exciter; none where the widest is none that was set."""
+    """Swings about the vertical of the runs without an exciter; none where nobody set the body turning."""
     free = [run for run in problem.runs if run.force is None]
     seen = [swing for run in free for swing in _turns(problem, run, threads)]
     return seen if seen and max(swing.amplitude for swing in seen) >= TURNED else []

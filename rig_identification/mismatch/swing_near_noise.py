@@ -7,8 +7,8 @@ the swing that nothing sees until the fitted runs are followed, and misses every
 
 So where whole runs come near the noise, and what is left is small, the laws that hardly trailed in pieces are
 fitted to whole runs as well, and about each of these fits all effects are chosen from anew. Which of them is
-taken, all runs say (swing_whole.py). Where one turn is all that is measured, pieces are not asked at all: what
-damps the turn is too little within one, beside a start and a swing that nothing sees.
+taken, all runs say (swing_whole.py). Where one turn is all that is measured, pieces are not asked: what damps
+the turn is too little within one, beside a start and a swing that nothing sees.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def _begun_straight(
     rest: State,
     guesses: tuple[State, ...],
 ) -> tuple[Problem, Point]:
-    """The turn alone with one law of the likeliest of some AMOUNTS, each start as the first swings have it."""
+    """The turn alone with one law, its amount the likeliest of AMOUNTS, each start as of the first swings."""
     problem = extended(straight, (candidate,))
     parameters = problem.bench.parameters
     theta = np.zeros(parameters.size)
@@ -210,8 +210,8 @@ def _everywhere_alike(candidate: Candidate) -> bool:
 def _straight(problem: Problem, at: NDArray[np.float64]) -> Problem:
     """The problem with a body that hangs straight, with the axes of the body ``at``, and hardly swings.
 
-    A body that hangs askew passes the turn on to the swing that nothing sees. Before the turn itself is right, a
-    fit bends both to what it lacks, and stays in that valley.
+    A body that hangs askew passes the turn on to the swing that nothing sees. Before the turn itself is
+    right, a fit bends both to what it lacks, and stays in that valley.
     """
     weak = problem.weak.copy()
     weak[ASKEW] *= CALM
@@ -222,8 +222,8 @@ def _straight(problem: Problem, at: NDArray[np.float64]) -> Problem:
 def _freed(bare: Problem, model: Whole) -> list[Whole]:
     """A model of the turn alone with the body and its swing as free as in ``bare``: as it stands, and fitted.
 
-    To either side of a body that hangs straight what a fit gains may be next to nothing, and far away it may bend
-    to noise. Which of both is likelier, all runs say.
+    To either side of a body that hangs straight what a fit gains may be next to nothing, and far away it may
+    bend to noise. Which of both is likelier, all runs say.
     """
     bench = replace(model.problem.bench, calm=bare.bench.calm)
     problem = replace(model.problem, bench=bench, weak=bare.weak, weak_center=bare.weak_center)

@@ -1,10 +1,10 @@
 """What damps a watched body, in whole runs, and which of several such models is taken.
 
 Each channel has its sensor's own noise here, for evidence compares fits to the same samples alone. One rule
-holds for all of them, the ideal model among them: log evidence of the fitted runs, plus log predictive density
-of the held-out ones, less what noise gains from so many effects among all that are asked. A model that predicts
-the held-out runs worse than the ideal one does is none, whatever it makes of the fitted ones: it bends a
-swing that nothing sees.
+holds for all of them, the ideal model among them: log evidence of the fitted runs, plus log predictive
+density of the held-out ones, less what noise gains from so many effects among all that are asked. A model
+that predicts the held-out runs worse than the ideal one does is none, whatever it makes of the fitted ones:
+it bends a swing that nothing sees.
 """
 
 from __future__ import annotations
