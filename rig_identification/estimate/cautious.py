@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.growing import HOPELESS_SQUARE, misfit
 from rig_identification.estimate.rest_evidence import RestEvidence
 from rig_identification.estimate.solve import (
@@ -34,6 +35,8 @@ MOTION_BAND = 5.0
 #: Rounds of weighing and fitting, and steps of each fit.
 ROUNDS = 4
 STEPS = 4
+#: Std of white noise's power up to which more than it counts as chance.
+CHANCE = 3.0
 #: Evaluations that a step may take on average, of a fit whose weights are made anew after it.
 HASTY = 1.0
 
@@ -75,6 +78,33 @@ def coherence(problem: Problem, evaluation: Evaluation) -> float:
         mean = np.mean([part for part in parts if part.size == size], axis=0)
         ratios.append(float(np.max(mean) / max(1.0, np.mean(mean))))
     return max(ratios)
+
+
+def left_beyond_noise(problem: Problem, sensed: tuple[Run, ...], evaluation: Evaluation) -> float:
+    """Squared length of what a fit leaves beyond its sensors' noise where motion is, in its own weights.
+
+    sensed: the runs of ``problem``, each channel with its sensor's own noise. With r what is left and J the
+    derivatives, a number is off by a' I^-1 J' r, which is no more than its std times the length of r (Cauchy
+    and Schwarz): so far may what a model lacks bend it, if all of it looks like this number's error. Infinite
+    where the fit cannot be evaluated.
+    """
+    bare = replace(problem, runs=sensed)
+    there = evaluate(bare, evaluation.point, residuals_only=True)
+    if there is None:
+        return np.inf
+    factors = {
+        (c.device, c.quantity, axis): float(heavy.noise[k] / c.noise[k])
+        for weighed, run in zip(problem.runs, sensed, strict=True)
+        for heavy, c in zip(weighed.channels, run.channels, strict=True)
+        for k, axis in enumerate(c.axes)
+    }
+    total = 0.0
+    for key, parts in _powers(bare, there).items():
+        lines = np.concatenate(parts)
+        # Each line stands for itself and its negative; white noise's sum has a std of root n
+        left = float(np.sum(lines)) - lines.size - CHANCE * np.sqrt(lines.size)
+        total += 2.0 * max(0.0, left) / factors[key] ** 2
+    return total
 
 
 def once(problem: Problem, evaluation: Evaluation) -> Problem:

@@ -66,8 +66,9 @@ from rig_identification.estimate.solve import (
 from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
-from rig_identification.estimate.textbook import textbook_answers
+from rig_identification.estimate.textbook import textbook_answers, turning_inertia
 from rig_identification.estimate.tied_to_rig import tied_note
+from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -209,10 +210,12 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     found = scan(problem, next((run for run in problem.runs if run.watched), problem.runs[0]))
     if found is None:
         return None
+    believed = _as_believed(problem, found)
+    found = found if believed is None else believed
     problem = replace(found.problem, runs=problem.runs)
     progress("looking for the free part of each run", 0.2)
     half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
-    theta = _rolling(half, found)
+    theta = _rolling(half, found) if believed is None else found.theta
     parts = [(r.recording.name, free_part(problem, r, theta, found.rest)) for r in (*problem.runs, *held)]
     free = tuple(with_noise_of_swing(part.run) for _, part in parts)
     by_hand = tuple(stretch for name, part in parts for stretch in _stretches(name, part))
@@ -222,6 +225,25 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     starts = launch_states(problem.bench, runs, theta, found.rest)
     point = Point(theta, starts, (found.rest,) * len(problem.rests))
     return Start(problem, point, found.rest, held, notes, by_hand)
+
+
+def _as_believed(problem: Problem, found: Scanned) -> Scanned | None:
+    """The body as believed, as large as the textbooks' formula makes it, where one turn is all there is.
+
+    None elsewhere, or on a rig without such a formula. The turn alone says no more of a body than that, and a
+    scan of one piece bends its shape, and a swing that nothing sees, to what damps the turn.
+    """
+    if not all(one_turn(run) for run in problem.runs):
+        return None
+    parameters = problem.bench.parameters
+    shape = parameters.elements(np.concatenate([problem.weak_center, np.zeros(parameters.size - INERTIAL)]))
+    inertia = turning_inertia(replace(found.problem, runs=problem.runs), float(shape[0]))
+    if inertia is None:
+        return None
+    shape[4:] *= inertia / shape[9]
+    theta = parameters.start(shape)
+    center = replace(found.problem, weak_center=theta[:INERTIAL].copy())
+    return Scanned(center, theta, rest_of(model_at(parameters, theta)))
 
 
 def _rolling(half: Problem, found: Scanned) -> Array:

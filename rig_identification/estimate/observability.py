@@ -120,19 +120,21 @@ def share_left(problem: Problem, evaluation: Evaluation) -> Array:
 
 
 def testimony(
-    problem: Problem, evaluation: Evaluation, predicted: dict[tuple[str, str, int], float]
+    problem: Problem, evaluation: Evaluation, predicted: dict[tuple[str, str, int], float], left: float
 ) -> tuple[str, ...]:
     """Elements that channels which the model does not predict would have to tell, or none tells.
 
     predicted: (device, quantity, axis) -> residual of a run predicted without a fit as a share of
-    its signal. A channel missed by more than ``GAIN`` of its motion testifies for nothing.
+    its signal. A channel missed by more than ``GAIN`` of its motion testifies for nothing. left: squared
+    length of what the fit leaves beyond noise (cautious.left_beyond_noise). An element that shows by less
+    than all of that could be bent to anything, and is not told.
     """
-    runs = []
+    runs, bent = [], np.sqrt(1.0 + min(left, SILENT**2))
     for run in problem.runs:
         channels = []
         for c in run.channels:
             mute = [predicted.get((c.device, c.quantity, a), 0.0) > GAIN for a in c.axes]
-            channels.append(replace(c, noise=np.where(mute, SILENT, 1.0) * c.noise))
+            channels.append(replace(c, noise=bent * np.where(mute, SILENT, 1.0) * c.noise))
         runs.append(replace(run, channels=tuple(channels)))
     heard = replace(problem, runs=tuple(runs))
     lost: set[str] = set()

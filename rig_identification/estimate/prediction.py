@@ -49,6 +49,7 @@ class Bench:
     parameters: ParameterSet
     mocap: sensors.MocapMount | None = None
     unseen: bool = False  # nothing that was measured tells how far the body swings (unseen_swing.py)
+    calm: float = 1.0  # share of what is believed of that swing's size that a fit leaves it
 
     def of(self, run: Run) -> Bench:
         """The bench as it is during a run: a number may count in some stretches alone (Parameter.during)."""

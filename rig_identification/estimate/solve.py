@@ -196,7 +196,7 @@ def _assemble(
         cost += run.cost
         if problem.bench.unseen:
             basis = start_basis(model_at(problem.bench.of(of).parameters, point.theta), start)
-            belief = swing_belief(problem.bench.rig, start, basis)
+            belief = swing_belief(problem.bench.rig, start, basis, problem.bench.calm)
             cost += belief[0]
             information[np.ix_(columns[p:], columns[p:])] += belief[1]
             gradient[columns[p:]] += belief[2]

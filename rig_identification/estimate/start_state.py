@@ -136,7 +136,9 @@ def fit_start(
 
 def _belief(bench: Bench, model: RigModel, start: State) -> tuple[float, Array | float, Array | float]:
     """Cost, information and negative gradient of what is believed of a swing that nothing measures."""
-    return swing_belief(bench.rig, start, start_basis(model, start)) if bench.unseen else (0.0, 0.0, 0.0)
+    if not bench.unseen:
+        return 0.0, 0.0, 0.0
+    return swing_belief(bench.rig, start, start_basis(model, start), bench.calm)
 
 
 def _weight(size: int, inner: int, spread: float) -> Array:

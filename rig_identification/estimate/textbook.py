@@ -48,21 +48,38 @@ def textbook_answers(problem: Problem, body: InertialEstimate) -> tuple[Textbook
     body: as fitted, of which the mass is taken where no scale told it.
     """
     threads = alike_threads(problem.bench.rig)
-    if threads is None:
-        return ()
-    free = [run for run in problem.runs if run.force is None]
-    seen = [swing for run in free for swing in _turns(problem, run, threads)]
-    if not seen or max(swing.amplitude for swing in seen) < TURNED:
+    seen = [] if threads is None else _free_turns(problem, threads)
+    if threads is None or not seen:
         return ()
     mass = problem.mass or (float(body.values[0]), float(np.sqrt(body.covariance[0, 0])))
     return (_answer(threads, mass, problem.bench.rig.gravity, seen),)
+
+
+def turning_inertia(problem: Problem, mass: float) -> float | None:
+    """kg m2 about the vertical by the formula; None where none is for such a rig or run. mass: kg."""
+    threads = alike_threads(problem.bench.rig)
+    seen = [] if threads is None else _free_turns(problem, threads)
+    if threads is None or not seen:
+        return None
+    return _inertia(threads, mass, problem.bench.rig.gravity, _common(seen)[0])
+
+
+def _inertia(threads: AlikeThreads, mass: float, gravity: float, frequency: float) -> float:
+    return mass * gravity * threads.product / (threads.height * frequency**2)
+
+
+def _free_turns(problem: Problem, threads: AlikeThreads) -> list[FreeSwing]:
+    """Swings about the vertical of the runs without an exciter; none where nobody set the body turning."""
+    free = [run for run in problem.runs if run.force is None]
+    seen = [swing for run in free for swing in _turns(problem, run, threads)]
+    return seen if seen and max(swing.amplitude for swing in seen) >= TURNED else []
 
 
 def _answer(
     threads: AlikeThreads, mass: tuple[float, float], gravity: float, seen: list[FreeSwing]
 ) -> TextbookAnswer:
     frequency, std = _common(seen)
-    value = mass[0] * gravity * threads.product / (threads.height * frequency**2)
+    value = _inertia(threads, mass[0], gravity, frequency)
     shares = {
         "period": value * 2.0 * std / frequency,
         "mass": value * mass[1] / mass[0],

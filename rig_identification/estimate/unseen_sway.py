@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.alike_threads import alike_threads
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.unseen_swing import SWING
+from rig_identification.estimate.wandering_bias import wander_shapes
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -52,7 +53,7 @@ def sway_shapes(rig: Rig, run: Run, channel: Channel) -> Array | None:
     shapes = np.concatenate([LEANS * swing, turn * swing, LEANS * (turn**2 - np.mean(turn**2))], axis=1)
     if channel.quantity == "angular_rate":
         shapes = np.gradient(shapes, run.grid.step, axis=0)
-    return np.asarray(shapes)
+    return np.concatenate([shapes, wander_shapes(run, channel)], axis=1)
 
 
 def _turn_of(channel: Channel, nodes: Array) -> Array:

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 #: rad, one standard deviation of a swing, and of rolling, at a run's start: three degrees.
 SWING = 0.05
+#: Share of that which is left to it until the turn itself is followed: before, a swing left free is bent to
+#: what the turn lacks, and a fit stays in that valley.
+CALM = 1e-2
 #: Rows of a start state's derivatives: place and rotation, their rates, each along x and y.
 ROWS = np.array([0, 1, 3, 4, 6, 7, 9, 10])
 
@@ -33,10 +36,10 @@ def swing_std(rig: Rig) -> Array:
     return np.repeat([SWING * length, SWING, *rates], 2)
 
 
-def swing_belief(rig: Rig, start: State, basis: Array) -> tuple[float, Array, Array]:
+def swing_belief(rig: Rig, start: State, basis: Array, share: float = 1.0) -> tuple[float, Array, Array]:
     """(cost, information (b, b), negative gradient (b,)) of a run that hardly swings at its start.
 
-    basis (X, b): directions in which the start may differ (prediction.start_basis).
+    basis (X, b): directions in which the start may differ (prediction.start_basis). share: of that std.
     """
     ceiling = np.mean([cable.ceiling_point for cable in rig.cables], axis=0)
     body = np.mean([cable.body_point for cable in rig.cables], axis=0)
@@ -48,6 +51,6 @@ def swing_belief(rig: Rig, start: State, basis: Array) -> tuple[float, Array, Ar
             start.rate[:2],
         ]
     )
-    std = swing_std(rig)
+    std = share * swing_std(rig)
     rows, miss = basis[ROWS] / std[:, None], away / std
     return 0.5 * float(miss @ miss), rows.T @ rows, -rows.T @ miss

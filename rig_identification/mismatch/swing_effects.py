@@ -196,7 +196,7 @@ def damped(
     def told(share: float) -> Callable[[str], None]:
         return lambda stage: notify(stage, share)
 
-    kinds = _best_of_each_kind(base, evaluation, dampers)
+    kinds = best_of_each_kind(base, evaluation, dampers)
     tried = _better(base, evaluation, kinds, count, told(0.2), budget)
     if not tried:
         return None
@@ -232,7 +232,7 @@ def _settled(
         if budget.spent():
             break
         notify("search: which effects together")
-        again = _together(base, problem, evaluation, choice)
+        again = together(base, problem, evaluation, choice)
         if again.labels in seen:
             break
         seen.add(again.labels)
@@ -297,7 +297,7 @@ def _all_at_once(
     )
 
 
-def _best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Candidate]) -> list[Candidate]:
+def best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Candidate]) -> list[Candidate]:
     """Of each effect the candidate that gains most to first order, where that comes near the best of all.
 
     base, evaluation: a fit without any effect.
@@ -314,7 +314,7 @@ def _best_of_each_kind(base: Problem, evaluation: Evaluation, dampers: list[Cand
     return list(best.values())
 
 
-def _together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
+def together(base: Problem, problem: Problem, evaluation: Evaluation, choice: Choice) -> Choice:
     """Which effects belong into the model, by what all at once promise about a fit with some (subsets.py).
 
     base: without any effect; problem, evaluation: the fit with those of ``choice``.

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.cautious import once, reweighted, solve_cautiously
+from rig_identification.estimate.cautious import left_beyond_noise, once, reweighted, solve_cautiously
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import settled_starts
@@ -20,6 +20,7 @@ from rig_identification.estimate.launch import launch_state
 from rig_identification.estimate.observability import testimony
 from rig_identification.estimate.segments import in_pieces
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, solve
+from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
@@ -29,6 +30,8 @@ from rig_identification.mismatch.hands import hand_finding, nobody_held
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.screen import with_reference
 from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Choice, Notify, damped, exchanged
+from rig_identification.mismatch.swing_near_noise import models_of_one_turn, near_noise_models
+from rig_identification.mismatch.swing_whole import Predicted, Whole, likeliest
 from rig_identification.mismatch.threads import physics_of_pendulums
 from rig_identification.mismatch.tracker_error import tracker_findings
 from rig_identification.mismatch.trial import Trial, in_stds, log_evidence, mass_of, may_be_none
@@ -42,11 +45,14 @@ WHOLE_STEPS = 20
 
 @dataclass(frozen=True)
 class Watched:
-    """The whole runs with what damps them, and the cautious fit of the body with that."""
+    """The whole runs with what damps them, and the cautious fit of the body with that.
+
+    No cautious fit where one turn is all that is measured and the whole runs leave noise alone.
+    """
 
     fitted: Fitted
     mismatch: Mismatch
-    careful: tuple[Problem, Evaluation]
+    careful: tuple[Problem, Evaluation] | None
     unobservable: tuple[str, ...]  # beyond what the information matrix alone names
 
 
@@ -93,21 +99,20 @@ def _scored(ideal: Fitted, heavy: Problem, evaluation: Evaluation, converged: bo
 def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watched | None:
     """Find what damps a watched body; None where nothing does. budget: past which nothing new is begun."""
     ideal = found_ideal.fitted
+    known = with_reference(ideal.problem, ideal.rest)
+    if all(one_turn(run) for run in ideal.problem.runs):
+        return _of_one_turn(found_ideal, known, notify, budget)
     if found_ideal.careful is None:
         return None
     notify("fitting in pieces", 0.05)
     start = found_ideal.careful[1].point.theta
     guesses = ideal.evaluation.point.rest_guesses
-    known = with_reference(ideal.problem, ideal.rest)
     parts, point = in_pieces(known, start, ideal.rest, guesses, LONGER)
     evaluation, _ = solve(parts, point, iterations=STEPS, tolerance=0.5)
     raw, parts = parts, reweighted(parts, evaluation)
     again = evaluate(parts, evaluation.point)
     evaluation = evaluation if again is None else again
-    rig, parameters = ideal.problem.bench.rig, ideal.problem.bench.parameters
-    mass = mass_of(parts, evaluation)
-    candidates = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
-    candidates += physics_of_pendulums(rig, mass)
+    candidates = _candidates(ideal, mass_of(parts, evaluation))
     answer = damped(raw, parts, evaluation, candidates, notify, budget)
     if answer is None or not answer[0].effects:
         return None
@@ -123,13 +128,78 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
     heavy, point = _begun_whole(ideal, *careful)
     whole, converged = solve(heavy, point, iterations=WHOLE_STEPS, tolerance=0.1)
     fitted = _scored(ideal, heavy, whole, converged)
-    evidence_of_all = log_evidence(whole)
-    found = [Trial(c, heavy, whole, evidence_of_all, True) for c in _sure(choice.effects, careful)]
+    first = Whole(choice, fitted.problem, fitted.evaluation, converged)
+    bare = replace(ideal.problem, bench=known.bench)
+    models = near_noise_models(bare, first, ideal.rest, budget)
+    best = likeliest(models, ideal, _predicting(ideal))
+    if best is None:
+        return None
+    sure = _sure(choice.effects, careful)
+    if best.choice.labels != choice.labels:
+        changed, parted = exchanged(parts, *careful, choice, best.choice)
+        careful = _tempered(*solve_cautiously(replace(changed, runs=raw.runs), parted.point))
+        sure = best.choice.effects
+    if best.evaluation is not fitted.evaluation:
+        fitted, heavy, whole = _predicting(ideal)(best), best.problem, best.evaluation
+    found = [Trial(c, heavy, whole, log_evidence(whole), True) for c in sure]
+    left = left_beyond_noise(careful[0], raw.runs, careful[1])
+    return _told(found_ideal, fitted, found, best.choice, careful, left)
+
+
+def _candidates(ideal: Fitted, mass: float) -> list[Candidate]:
+    """What may damp a watched body of a ``mass`` (kg), and what small bodies on threads show besides."""
+    rig, parameters = ideal.problem.bench.rig, ideal.problem.bench.parameters
+    damping = [c for c in left_out_physics(rig, parameters, mass) if c.effect in DAMPERS]
+    return damping + physics_of_pendulums(rig, mass)
+
+
+def _predicting(ideal: Fitted) -> Predicted:
+    """What a model of whole runs makes of the held-out ones."""
+    return lambda model: _scored(ideal, model.problem, model.evaluation, model.converged)
+
+
+def _of_one_turn(found_ideal: Ideal, known: Problem, notify: Notify, budget: Budget) -> Watched | None:
+    """What damps a body of which one turn is all that is measured; None where nothing does.
+
+    known: the whole runs with the reference that effects need.
+    """
+    ideal = found_ideal.fitted
+    bare = replace(ideal.problem, bench=known.bench)
+    candidates = _candidates(ideal, mass_of(ideal.problem, ideal.evaluation))
+    best = likeliest(models_of_one_turn(bare, ideal, candidates, notify, budget), ideal, _predicting(ideal))
+    if best is None:
+        return None
+    fitted = _predicting(ideal)(best)
+    found = [Trial(c, best.problem, best.evaluation, 0.0, True) for c in best.choice.effects]
+    if judged(fitted)[1].verdict == "none":
+        # Nothing is left that would bend the body: the whole runs tell of it
+        return _told(found_ideal, fitted, found, best.choice, None, 0.0)
+    notify("weighing each channel by its residual", 0.8)
+    heavy = reweighted(best.problem, best.evaluation)
+    careful = _tempered(heavy, solve(heavy, best.evaluation.point, iterations=STEPS, tolerance=0.1)[0])
+    left = left_beyond_noise(careful[0], best.problem.runs, careful[1])
+    return _told(found_ideal, fitted, found, best.choice, careful, left)
+
+
+def _told(
+    found_ideal: Ideal,
+    fitted: Fitted,
+    found: list[Trial],
+    choice: Choice,
+    careful: tuple[Problem, Evaluation] | None,
+    left: float,
+) -> Watched:
+    """The answer with the effects of ``found`` in the whole runs ``fitted``.
+
+    careful: the cautious fit; None where the whole runs tell of the body. left: what that leaves beyond noise
+    (cautious.left_beyond_noise).
+    """
     after, verdict = judged(fitted)
-    told = estimates(fitted.problem, fitted.evaluation, spread=careful[1])
+    basis = careful or (fitted.problem, fitted.evaluation)
+    told = estimates(fitted.problem, fitted.evaluation, spread=basis[1])
     evidence = evidence_of(found_ideal, fitted, after.holdout)
     findings = [finding(t, told, evidence) for t in found]
-    hand = hand_finding(ideal)
+    hand = hand_finding(found_ideal.fitted)
     if hand is not None and not (verdict.verdict == "none" and nobody_held(fitted)):
         findings.append(hand)
     findings += tracker_findings(fitted, evidence)
@@ -142,7 +212,7 @@ def explain_watched(found_ideal: Ideal, notify: Notify, budget: Budget) -> Watch
         text = f"{named} explains part of it; something is left. {verdict.explanation}"
         mismatch = Mismatch("unexplained", text, tuple(findings), choice.rivals)
     hidden = {name for t in found for name in t.candidate.hides}
-    lost = hidden | set(testimony(*careful, _missed(fitted)))
+    lost = hidden | set(testimony(*basis, _missed(fitted), left))
     return Watched(fitted, mismatch, careful, tuple(name for name in ELEMENTS if name in lost))
 
 

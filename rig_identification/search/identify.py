@@ -221,7 +221,8 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
     session, ideal, budget = so_far.session, so_far.ideal, so_far.budget
     plain, swinging = _plain(so_far), None
     if only_watched(ideal.fitted.problem) and ideal.mismatch.verdict != "none":
-        ideal = so_far.ideal = with_pieces(ideal, searching)
+        if not _one_turn(ideal):
+            ideal = so_far.ideal = with_pieces(ideal, searching)
         watched = _watched(ideal, searching, budget)
         if watched is not None:
             swinging = so_far.swinging = _answer_of(watched, session, plain)
