@@ -2,15 +2,17 @@
 
 Next to gain and zero the commonest fault of a measuring chain is that one channel leaks into another: cells
 that share an amplifier or a bracket, a gyroscope that feels acceleration, axes that are not square to each
-other. Each is one share, of one other reading, beside a zero that nobody has taken off.
+other. Each is one share, of one other reading, beside a zero that nobody has taken off. Two cells of one
+amplifier mostly feel each other.
 """
 
 from __future__ import annotations
 
-from itertools import permutations
+from itertools import combinations, permutations
 
+from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
-from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.mismatch.sensor_errors import RANGE, freed
 from rig_identification.rig import Rig
 
@@ -19,8 +21,8 @@ from rig_identification.rig import Rig
 SHARE = 0.05
 FELT_FORCE = 0.005
 
-#: What such a law is called.
-FEELS = "cross-sensitivity"
+#: What such a law is called, of one cell and of two that feel each other.
+FEELS, EACH_OTHER = "cross-sensitivity", "cross-talk"
 
 _AXES = [("gyroscope", a) for a in AXES] + [("accelerometer", a) for a in AXES]
 _QUANTITY = {"gyroscope": "angular_rate", "accelerometer": "specific_force"}
@@ -42,9 +44,31 @@ def cross_sensitivity(rig: Rig, parameters: ParameterSet, devices: list[str]) ->
                 {"channel": cell, "axis": None, "quantity": "tension", "law": FEELS, "felt": other},
             )
         )
+    out += [_each_other(parameters, *pair) for pair in combinations(cells, 2)]
     if "imu" in devices:
         out += _imu(parameters)
     return out
+
+
+def _each_other(parameters: ParameterSet, one: str, other: str) -> Candidate:
+    """Two cells of which each feels the other."""
+    laws = parameters.places.laws()
+    names = f"{one}.feels.{other}", f"{other}.feels.{one}"
+    shares = tuple(Parameter(n, "1", 0.0, SHARE, "device", laws[n], bounded=False) for n in names)
+    zeros = [freed(parameters, f"{cell}.load_cell_zero", RANGE["load_cell_zero"]) for cell in (one, other)]
+
+    def told(found: Estimates) -> Told:
+        return {"sensitivity": (*found.of(names[0]), "1"), "sensitivity_back": (*found.of(names[1]), "1")}
+
+    return Candidate(
+        "unknown",
+        (*shares, *(zero for zero in zeros if zero is not None)),
+        f"The load cells of {one} and {other} feel each other: {{value}} of the load of {other} is read by "
+        f"{{channel}}, and {{told[sensitivity_back]}} of its own by the other.",
+        "Look for what the two share: amplifier, cable, bracket. Load one cell at a time.",
+        {"channel": one, "axis": None, "quantity": "tension", "law": EACH_OTHER, "felt": other},
+        tell=told,
+    )
 
 
 def _imu(parameters: ParameterSet) -> list[Candidate]:
