@@ -37,6 +37,7 @@ def ruled(
     physics[block + place.LAW_BRAKE :][:2] = brake
     physics[block + place.LAW_DIRECTION :][:2] = LINE
     physics[block + place.LAW_NARROW] = narrow
+    physics[block + place.LAW_UPRIGHT] = 1.0
     return model.with_physics(physics)
 
 
@@ -91,7 +92,7 @@ def test_derivatives_of_a_law() -> None:
     model = ruled(sample, plain, (4e3, -6e4, 3e6), (80.0, 200.0), 3.0)
     state, drive = moving(sample, plain, 5), drive_of(31, 0.01, 5)
     block = place.effects_block(model.cables)
-    model.physics[block + place.LAW_SATURATION] = 4.0
+    model.physics[block + place.LAW_SATURATION], model.physics[block + place.LAW_UPRIGHT] = 4.0, 0.7
     own = {
         block + first + i: step
         for first, count, step in (
@@ -101,6 +102,7 @@ def test_derivatives_of_a_law() -> None:
             (place.LAW_DIRECTION, 2, 1e-3),
             (place.LAW_NARROW, 1, 1e-2),
             (place.LAW_SATURATION, 1, 1e-2),
+            (place.LAW_UPRIGHT, 1, 1e-2),
         )
         for i in range(count)
     }

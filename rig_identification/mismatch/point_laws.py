@@ -41,6 +41,8 @@ NARROWS = (0.0, 0.5, 2.0)
 #: How early a brake saturates: squares of the largest speed in parts of that at which it pulls most. A magnet
 #: over copper does so at some cm/s, dry friction at once.
 EARLY = (3.0, 30.0)
+#: How far a brake counts the vertical at first: between not at all, 0, and like any other direction, 1.
+UPRIGHT = 0.5
 #: Std of a line's angles, rad.
 TURNED = 0.5
 #: Contract-like names and units of the parts.
@@ -88,7 +90,9 @@ def brake_law(rig: Rig, scales: Scales, early: float = 0.0) -> Candidate:
         bent = replace(
             added("unknown.saturation", "s^2/m^2", 1.0, block + place.LAW_SATURATION, known), ratio=True
         )
-    return _law((*amounts, bent, *_point(rig, scales)), 1)
+    # The vertical part may count like any other, or not at all
+    upright = added("unknown.upright", "1", 0.5, block + place.LAW_UPRIGHT, UPRIGHT)
+    return _law((*amounts, bent, upright, *_point(rig, scales)), 1)
 
 
 def _law(parameters: tuple[Parameter, ...], positive: int) -> Candidate:
@@ -119,6 +123,7 @@ def _told(found: Estimates) -> Told:
         (
             *SPRINGS,
             *BRAKES,
+            ("upright", "1"),
             ("narrow", "1/m^2"),
             ("saturation", "s^2/m^2"),
             ("azimuth", "rad"),
@@ -173,6 +178,7 @@ class Law:
         if self.line is not None:
             force = _pulls(u / scales.travel, *self.line)
         else:
+            v = v * np.array([1.0, 1.0, UPRIGHT])
             force = _brakes(u / scales.travel, v / scales.speed, self.narrow, self.early)
         force = scales.force * force
         body = np.einsum("nji,njc->nic", motion.R_world_body, force)
@@ -279,5 +285,6 @@ def _force(model: RigModel, motion: Motion, at: Array) -> Array:
     block = layout.effects_offset(model.cables)
     p, (u, v) = model.physics[block:], followed(model, motion, at)
     pulls = _pulls(u, *p[place.LAW_DIRECTION :][:2]) @ p[place.LAW_SPRING :][:3]
+    v = v * np.array([1.0, 1.0, p[place.LAW_UPRIGHT]])
     brakes = _brakes(u, v, p[place.LAW_NARROW], p[place.LAW_SATURATION])
     return np.asarray(pulls + brakes @ p[place.LAW_BRAKE :][:2])

@@ -3,6 +3,7 @@
 With q the point, u = q - q0 its travel from where it hangs at rest (a constant of the session) and v its
 velocity, all in the world,
     F = -(k1 s + k2 s^2 + k3 s^3) d - (c1 + c2 |v|) exp(-n |u|^2) v / (1 + w |v|^2),    s = d . u
+where the brake counts the vertical part of v by h: 1 to all sides, 0 for what slides over a level plane.
 The first part is a spring along the line d that hardens, softens or pushes (a magnet, a bush, a belt); it
 keeps energy, its potential being k1 s^2/2 + k2 s^3/3 + k3 s^4/4. The second is a brake to all sides that may
 fade with distance (an eddy-current brake, a rubbing brush, a sail away from the centre of mass) or saturate:
@@ -25,6 +26,7 @@ from rig_identification.model.effects.place import (
     LAW_POINT,
     LAW_SATURATION,
     LAW_SPRING,
+    LAW_UPRIGHT,
     active,
 )
 from rig_identification.model.effects.point import force_at, push_at, travel
@@ -49,6 +51,9 @@ def add_point_law(physics, block, x, R, r):  # type: ignore[no-untyped-def]
         push_at(physics, point, R, force * dx, force * dy, force * dz, r)
     if brakes:
         bx, by, bz = velocity_of(x, R, physics[point], physics[point + 1], physics[point + 2])
+        # Less what of its vertical part does not count
+        less = (1.0 - physics[block + LAW_UPRIGHT]) * (R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz)
+        bx, by, bz = bx - less * R[2, 0], by - less * R[2, 1], bz - less * R[2, 2]
         # 1e-12 m^2/s^2 keeps the root's derivative finite at rest
         speed = root(bx * bx + by * by + bz * bz + 1e-12)
         fade = np.exp(-physics[block + LAW_NARROW] * (ux * ux + uy * uy + uz * uz))
