@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from steady_zeros import steady_zeros_of_the_test  # noqa: F401
 from test_model_rigs import Sample, random_sample, thesis_case_14
 
 from rig_identification.estimate.evidence import Run, prepare
@@ -96,6 +97,7 @@ def unwhitened(linearised: Linearised | None) -> Array:
     return linearised.jacobian * np.sqrt(linearised.variance)[:, None]
 
 
+@pytest.mark.usefixtures("steady_zeros")
 def test_every_free_parameter_of_a_run(short: tuple[Problem, Run, Array, State]) -> None:
     problem, run, theta, start = short
     run = replace(run, exciter_noise=0.0)
@@ -122,6 +124,7 @@ def test_every_free_parameter_of_a_run(short: tuple[Problem, Run, Array, State])
         assert error <= 2e-5 * size, f"{name}: off by {error / size:.1e}"
 
 
+@pytest.mark.usefixtures("steady_zeros")
 def test_the_clock_of_the_exciter() -> None:
     session, truth = recorded(random_sample(21, 3), noise=False, duration=3.0)
     problem, _, _ = pose_problem(session)
@@ -142,6 +145,7 @@ def test_the_clock_of_the_exciter() -> None:
         assert np.max(error) <= 0.05 * size
 
 
+@pytest.mark.usefixtures("steady_zeros")
 def test_every_start_coordinate_of_a_run(short: tuple[Problem, Run, Array, State]) -> None:
     problem, run, theta, start = short
     run = replace(run, exciter_noise=0.0)

@@ -52,7 +52,7 @@ def at_bounds(fitted: Fitted) -> int:
     return int(np.sum(theta[bounded] > fitted.problem.bound - 1e-6))
 
 
-@pytest.mark.parametrize(("tolerances", "pressed"), [(WITHIN, 0), (BEYOND, 2)])
+@pytest.mark.parametrize(("tolerances", "pressed"), [(WITHIN, 0), (BEYOND, 1)])
 def test_a_doubt_promises_what_its_fit_gains(made: Session, tolerances: float, pressed: int) -> None:
     """The prior that it had costs nothing any more, and what lies at a bound for it comes back from there."""
     fitted, promise, trial = promised_and_kept(made, tolerances)

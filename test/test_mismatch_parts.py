@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from steady_zeros import steady_zeros_of_the_test  # noqa: F401
 from test_estimate_prediction import short  # noqa: F401
 from test_model_internal import with_rest
 from test_model_rigs import thesis_case_14
@@ -165,6 +166,7 @@ def test_supports_change_the_model_and_nothing_else() -> None:
     assert largest_compliance(sample.rig, 1200.0) * 1200.0 * sample.rig.gravity == pytest.approx(0.01)
 
 
+@pytest.mark.usefixtures("steady_zeros")
 def test_a_response_is_whitened_as_the_residuals_are(
     short: tuple[Problem, Run, Array, State],  # noqa: F811
 ) -> None:
@@ -185,6 +187,7 @@ def test_a_response_is_whitened_as_the_residuals_are(
         assert whitened_response(nominal, wrenches, smooth=smooth) == pytest.approx(columns[:, 1:], abs=1e-9)
 
 
+@pytest.mark.usefixtures("steady_zeros")
 def test_a_wrench_moves_every_sample_as_running_the_model_again_does(
     short: tuple[Problem, Run, Array, State],  # noqa: F811
 ) -> None:

@@ -121,7 +121,8 @@ def test_map_of_case_5(case_1):
     early = worst_percent(case_1.case, few.output_error[0])
     assert early < 0.2  # second order in the hundredth that the linearisation is off by
     spread = few.output_error_std[:, 0, 0]
-    assert spread[-1] > 10.0 * spread[0]
+    # Zeros that wander bound what any window tells
+    assert spread[-1] > 4.0 * spread[0]
     assert np.all(np.diff(few.output_error_std[:, 2, 2]) > -1e-9)  # fewer samples never tell more
     assert few.statement(case_1.case.inertia).startswith(f"Of {WINDOWS // 30} windows")
 

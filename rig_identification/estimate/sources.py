@@ -148,7 +148,10 @@ def _parts(problem: Problem, evaluation: Evaluation, moved: Array) -> Iterator[_
 
 def _of_run(run: Run, linearised: Linearised, moved: Array) -> Iterator[_Part]:
     """Each channel's noise in motion."""
-    back = undone(linearised, linearised.jacobian @ moved)
+    whitened = linearised.jacobian @ moved
+    zeros = linearised.wander.responses.T @ linearised.wander.without(whitened)
+    yield _Part("zeros from one recording to the next", "noise", zeros, None)
+    back = undone(linearised, whitened)
     back *= np.sqrt(linearised.variance)[:, None]
     for index, channel in enumerate(run.channels):
         freedom = float(channel.values.size) if channel.noise_estimated else None
@@ -159,7 +162,7 @@ def _of_run(run: Run, linearised: Linearised, moved: Array) -> Iterator[_Part]:
 def undone(linearised: Linearised, whitened: Array) -> Array:
     """(m, c) inverse covariance of a run's samples times columns that come ``whitened`` (m, c)."""
     gains, deviations = linearised.filter
-    noise, columns = linearised.noise, whitened.copy()
+    noise, columns = linearised.noise, linearised.wander.without(whitened)
     if not np.any(noise.Q):
         return np.asarray(columns / deviations[:, None])
     whitened_back(
