@@ -11,7 +11,6 @@ from rig_identification.estimate.evidence import Index, columns_of
 from rig_identification.estimate.force_noise import Discrepancy
 from rig_identification.estimate.noise import noise_std
 from rig_identification.estimate.prediction import Bench, read_device
-from rig_identification.estimate.wander import wander_of
 from rig_identification.model import layout, work
 from rig_identification.model.body import point_inertia, six_elements
 from rig_identification.model.equilibrium import Rest, find_rest, wrench_response
@@ -82,7 +81,6 @@ def prepare_rest(rig: Rig, recording: Recording) -> RestEvidence:
             mean, variance = np.mean(series.values, axis=0), mean_variance(series.values, std)
             time = np.linspace(series.time[0], series.time[-1], SPREAD)
             loud = bool(np.any(variance > std**2 / series.values.shape[0]))
-            variance = variance + wander_of(rig, quantity) ** 2
             channels.append(
                 RestChannel(device, quantity, unit, part.components, mean, variance, std, time, loud)
             )

@@ -5,7 +5,8 @@ come back to a thousandth of that: so well is the mean of half a minute known. A
 gyroscopes do not; their zeros return to a part of what they may be off. A held-out run whose gyroscope stands
 3e-5 rad/s elsewhere would refute any model.
 
-So each recording has a deviation of its own from each zero, N(0, s^2), which no fit asks for: it is noise.
+So each run has a deviation of its own from each zero, N(0, s^2), which no fit asks for: it is noise. The zero
+itself is that of the recordings at rest, whose means scatter as their blocks do (rest_evidence.py).
 With B the whitened responses of a run's rows to a std of each, the residuals' covariance is 1 + B B^T, and
     (1 + B B^T)^(-1/2) = 1 - B M B^T,   M = V diag((1 - (1 + l)^(-1/2)) / l) V^T,   B^T B = V diag(l) V^T
 whitens them once more.
