@@ -9,7 +9,8 @@ import pytest
 from test_estimate_only_turns import PERIOD, SECONDS, run_of, session
 from test_model_rigs import bifilar
 
-from rig_identification.estimate.unseen_sway import sway_shapes, without_sway
+from rig_identification.estimate.unseen import read_beside
+from rig_identification.estimate.unseen_sway import without_sway
 from rig_identification.estimate.wandering_bias import INSTABILITY, wander_shapes
 
 RUN = run_of(session(bifilar().rig))
@@ -37,7 +38,7 @@ def test_an_angle_has_no_bias_that_wanders() -> None:
 
 def test_a_slow_bias_weighs_little_and_the_turn_as_much_as_before() -> None:
     shapes = wander_shapes(RUN, RATE)
-    read = sway_shapes(bifilar().rig, RUN, RATE)
+    read = read_beside(bifilar().rig, RUN, RATE)
     assert read is not None
     assert np.array_equal(read[:, -shapes.shape[1] :], shapes)
     noise = 1e-3 * np.sqrt(RUN.grid.step)

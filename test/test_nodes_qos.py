@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
 
-from node_processes import _DOMAINS, PACKAGE, RIG
+from node_processes import run_code
 
 #: A tracker with its rig, whose subscriptions are looked at.
 CODE = """\
@@ -40,15 +37,7 @@ rclpy.try_shutdown()
 
 def subscriptions(folder: Path, *arguments: str) -> dict[str, list[object]]:
     """Topic -> reliability and depth of a tracker that is started with ROS arguments."""
-    (folder / "rig.yaml").write_text(RIG)
-    given = ["--ros-args", "--params-file", str(folder / "rig.yaml"), "-r", "__ns:=/rig", *arguments]
-    path = os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")])
-    more = {"PYTHONPATH": path, "ROS_DOMAIN_ID": str(next(_DOMAINS)), "ROS_LOG_DIR": str(folder / "log")}
-    done = subprocess.run(
-        [sys.executable, "-c", CODE, *given], cwd=folder, env={**os.environ, **more}, capture_output=True,
-        text=True, timeout=240.0, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = run_code(folder, CODE, *arguments)
     found: dict[str, list[object]] = json.loads(done.stdout.splitlines()[-1])
     return found
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,8 +13,6 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]'")
 
 from node_processes import (  # noqa: F401
-    _DOMAINS,
-    PACKAGE,
     RIG,
     SIMULATOR,
     Diagnostics,
@@ -23,6 +20,7 @@ from node_processes import (  # noqa: F401
     Probe,
     graph_of_the_test,
     probe_of_the_test,
+    run_code,
 )
 from std_msgs.msg import String
 
@@ -118,16 +116,7 @@ rclpy.try_shutdown()
 
 
 def test_a_node_that_ends_starts_no_other_look(tmp_path: Path) -> None:
-    (tmp_path / "rig.yaml").write_text(RIG)
-    given = ["--ros-args", "--params-file", str(tmp_path / "rig.yaml"), "-r", "__ns:=/rig"]
-    path = os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")])
-    more = {"PYTHONPATH": path, "ROS_DOMAIN_ID": str(next(_DOMAINS)), "ROS_LOG_DIR": str(tmp_path / "log")}
-    done = subprocess.run(
-        [sys.executable, "-c", ENDED, *given], cwd=tmp_path,
-        env={**os.environ, **more, "TMPDIR": str(tmp_path)},
-        capture_output=True, text=True, timeout=240.0, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = run_code(tmp_path, ENDED)
     assert done.stdout.splitlines()[-1].split()[1:] == ["None", "None"]
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.glob("rig_watch_*"))

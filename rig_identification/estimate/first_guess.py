@@ -208,11 +208,11 @@ def start_from_mocap(
     line, spin = np.split(
         np.polynomial.polynomial.polyfit(pose.time[early], pose.values[early], 1), 2, axis=1
     )
-    R_bm = Rotation.from_rotvec(device[3:6]).as_matrix() @ mount.R_body_marker
-    R_tw = Rotation.from_rotvec(device[9:12]).as_matrix() @ mount.R_tracker_world
+    mount = mount.off_by(device)
+    R_bm, R_tw = mount.R_body_marker, mount.R_tracker_world
     R_tracker_body = run.R_tracker_mean @ Rotation.from_rotvec(spin[0]).as_matrix() @ R_bm.T
     R = R_tw.T @ R_tracker_body
     rate = R_bm @ spin[1]
-    arm = R @ (mount.marker_position + device[0:3])
-    marker = R_tw.T @ (line[0] - mount.world_position - device[6:9])
+    arm = R @ mount.marker_position
+    marker = R_tw.T @ (line[0] - mount.world_position)
     return on_cables(model, State(marker - arm, R, R_tw.T @ line[1] - np.cross(R @ rate, arm), rate))

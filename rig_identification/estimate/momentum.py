@@ -106,20 +106,33 @@ def regress(balances: list[tuple[Array, Array]], theta: Array, weak: Array) -> t
     """
     rows = np.concatenate([b[0] for b in balances])
     right = np.concatenate([b[1] for b in balances])
-    # Force and moment rows scatter differently: weigh each kind by its own spread
-    kind = np.tile(np.repeat([0, 1], 3), rows.shape[0] // 6)
-
-    def spreads(miss: Array) -> Array:
-        return np.array([np.sqrt(np.mean(miss[kind == k] ** 2)) + 1e-12 for k in (0, 1)])
-
     guess = theta.copy()
     for _ in range(REGRESSION_STEPS):
         miss = right - rows @ linear_from_log_cholesky(theta)
         slope = rows @ linear_in_log_cholesky(theta)
-        spread = spreads(miss)[kind]
+        spread = spread_of_rows(miss)
         slope, miss = slope / spread[:, None], miss / spread
         normal = slope.T @ slope + np.diag(1.0 / weak**2)
         change = np.linalg.solve(definite(normal), slope.T @ miss - (theta - guess) / weak**2)
         theta = theta + change * min(1.0, 1.0 / float(np.max(np.abs(change))))
-    left = spreads(right - rows @ linear_from_log_cholesky(theta))
+    left = _spreads(right - rows @ linear_from_log_cholesky(theta))
     return theta, float(np.sum(np.log(left)))
+
+
+def spread_of_rows(miss: Array) -> Array:
+    """(m,) root mean square of a balance's rows ``miss`` (m,), of each by its kind.
+
+    Force and moment rows scatter differently: each kind is weighed by its own spread.
+    """
+    return np.asarray(_spreads(miss)[_kinds(miss.size)])
+
+
+def _spreads(miss: Array) -> Array:
+    """(2,) root mean square of force and of moment rows."""
+    kind = _kinds(miss.size)
+    return np.array([np.sqrt(np.mean(miss[kind == k] ** 2)) + 1e-12 for k in (0, 1)])
+
+
+def _kinds(size: int) -> NDArray[np.int64]:
+    """(size,) 0 for a row of force, 1 for one of moment."""
+    return np.tile(np.repeat([0, 1], 3), size // 6)

@@ -20,8 +20,8 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.first_guess import extent, headings, seen_pose, seen_whole
-from rig_identification.estimate.momentum import balance, regress
+from rig_identification.estimate.first_guess import extent, headings, seen_pose
+from rig_identification.estimate.momentum import balance, regress, spread_of_rows
 from rig_identification.estimate.parameters import INERTIAL, ParameterSet
 from rig_identification.estimate.prediction import Bench
 from rig_identification.estimate.track import Track
@@ -72,7 +72,7 @@ class Seen:
 def seen_motion(run: Run) -> Seen | None:
     """The tracker's poses smoothed at the run's nodes; None where it sees less than a pose."""
     pose = seen_pose(run)
-    if pose is None or run.R_tracker_mean is None or not seen_whole(run):
+    if pose is None or run.R_tracker_mean is None or not np.all(pose.known):
         return None
     step = run.grid.step
     time = np.arange(run.grid.nodes, dtype=np.float64) * step
@@ -154,10 +154,10 @@ class _Lengths:
         """Cost and mount that keeps the lengths best, from a first one."""
 
         def residuals(errors: Array) -> Array:
-            return np.concatenate([self.missed(_moved(first, errors)), errors / self.prior])
+            return np.concatenate([self.missed(first.off_by(errors)), errors / self.prior])
 
         best = least_squares(residuals, np.zeros(12), x_scale="jac", max_nfev=60)
-        return float(best.cost), _moved(first, best.x)
+        return float(best.cost), first.off_by(best.x)
 
 
 def _balanced(
@@ -172,10 +172,6 @@ def _balanced(
         rows, right = both
         return right - rows @ linear_from_log_cholesky(body)
 
-    def spread(miss: Array) -> Array:
-        each = np.sqrt(np.mean(miss.reshape(-1, 2, 3) ** 2, axis=(0, 2))) + 1e-12
-        return np.tile(np.repeat(each, 3), miss.size // 6)
-
     guess = theta[:INERTIAL]
     at_first = balance(lengths.seen.track(first), run, parameters, theta)
     assert at_first is not None
@@ -183,17 +179,17 @@ def _balanced(
     x = np.concatenate([np.zeros(12), body])
     scale = np.concatenate([lengths.prior, weak])
     for _ in range(ROUNDS):
-        weight = spread(missed(_moved(first, x[:12]), x[12:]))
+        weight = spread_of_rows(missed(first.off_by(x[:12]), x[12:]))
 
         def residuals(x: Array, weight: Array = weight) -> Array:
-            mount = _moved(first, x[:12])
+            mount = first.off_by(x[:12])
             belief = np.concatenate([x[:12], x[12:] - guess]) / scale
             return np.concatenate([lengths.missed(mount), missed(mount, x[12:]) / weight, belief])
 
         x = least_squares(residuals, x, x_scale="jac", max_nfev=EVALUATIONS).x
-    mount, out = _moved(first, x[:12]), theta.copy()
+    mount, out = first.off_by(x[:12]), theta.copy()
     out[:INERTIAL] = x[12:]
-    left = spread(missed(mount, x[12:]))
+    left = spread_of_rows(missed(mount, x[12:]))
     cost = 0.5 * float(np.sum(lengths.missed(mount) ** 2)) + float(np.sum(np.log(left)))
     return Mounted(mount, out, cost)
 
@@ -203,16 +199,6 @@ def _level(run: Run, seen: Seen, rest: State, R_tracker_world: Array) -> MocapMo
     R_body_marker = (R_tracker_world @ rest.R_world_body).T @ run.R_tracker_mean
     world = np.mean(seen.position, axis=0) - R_tracker_world @ rest.position
     return MocapMount(np.zeros(3), R_body_marker, world, R_tracker_world)
-
-
-def _moved(mount: MocapMount, errors: Array) -> MocapMount:
-    """A mount off by errors (12,): marker's place and turn, world's place and turn (model/sensors.py)."""
-    return MocapMount(
-        mount.marker_position + errors[:3],
-        _matrix(errors[3:6]) @ mount.R_body_marker,
-        mount.world_position + errors[6:9],
-        _matrix(errors[9:12]) @ mount.R_tracker_world,
-    )
 
 
 def _matrix(turn: Array) -> Array:

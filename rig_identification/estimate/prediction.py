@@ -13,12 +13,13 @@ from scipy.spatial.transform import Rotation
 from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, random_wrench
 from rig_identification.estimate.lag import lagged, settling_cost, unsettled
+from rig_identification.estimate.marginal import Marginal, marginal
 from rig_identification.estimate.mounting import mounted, mounted_change
 from rig_identification.estimate.parameters import MOUNTED, DeviceLayout, ParameterSet
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
-from rig_identification.estimate.wander import Wander, wander, wander_of
+from rig_identification.estimate.wander import wander_of
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors, work
 from rig_identification.model.constraints import rigid_jacobian
@@ -153,7 +154,7 @@ class Linearised:
     noise: RandomWrench  # what noise drives the model with
     latent: Array  # (N, 6) wrench noise that the nominal motion holds, of a discrepancy where there is one
     readings: dict[str, sensors.Reading]  # each device at the nodes
-    wander: Wander  # what the zeros' own deviations in this run do
+    wander: Marginal  # what the zeros' own deviations in this run do
 
     @property
     def cost(self) -> float:
@@ -338,9 +339,10 @@ def linearise_run(
     at, which = np.concatenate(nodes)[order], which[order]
     axis, variance = np.empty(size, dtype=np.int64), np.empty(size)
     H, D = np.empty((size, motion.states.shape[1])), np.empty((size, 6))
-    zeros = [(i, k) for i, c in enumerate(run.channels) if _wanders(bench, c) for k in range(c.width)]
-    count = 1 + known + starts
-    columns = np.empty((size, count + len(zeros)))
+    wandering = [wander_of(bench.rig, c.quantity) for c in run.channels]
+    count = zero = 1 + known + starts
+    zeros = sum(c.width for c, std in zip(run.channels, wandering, strict=True) if std > 0.0)
+    columns = np.empty((size, count + zeros))
     columns[:, count:] = 0.0
     readings: dict[str, sensors.Reading] = {}
     first, settled = 0, 0.0
@@ -363,9 +365,10 @@ def linearise_run(
         variance[here] = spread.ravel()
         H[here], D[here] = in_state.reshape(spread.size, -1), in_wrench.reshape(spread.size, 6)
         columns[here, :count] = rows.reshape(spread.size, -1)
-        for column, (of, k) in enumerate(zeros, start=count):
-            if of == index:
-                columns[here[k :: channel.width], column] = wander_of(bench.rig, channel.quantity)
+        if wandering[index] > 0.0:
+            for k in range(channel.width):
+                columns[here[k :: channel.width], zero] = wandering[index]
+                zero += 1
     plain = columns[:, 0].copy()
     A, B, _, _, _ = motion.derivatives
     acts = extra_noise is not None or latent is not None or discrepancy is not None
@@ -386,7 +389,7 @@ def linearise_run(
     if columns.size and not max(float(np.max(columns)), -float(np.min(columns))) < LARGEST:
         # Derivatives of motions that part from each other may grow beyond every number
         return None
-    own_zeros, doubt = wander(columns[:, count:])
+    own_zeros, doubt = marginal(columns[:, count:])
     columns = own_zeros.without(columns[:, :count])
     whitened = columns[:, 1:]
     if start_only:
@@ -409,11 +412,6 @@ def linearise_run(
         readings,
         own_zeros,
     )
-
-
-def _wanders(bench: Bench, channel: Channel) -> bool:
-    """Whether a channel's zero is a little another one in each recording."""
-    return wander_of(bench.rig, channel.quantity) > 0.0
 
 
 def smoothed(linearised: Linearised, start: Array | None = None) -> tuple[Array, Array, Array]:

@@ -1,4 +1,4 @@
-"""What samples may be off by, and is integrated out of a run: an unseen sway, a tracker's pose error."""
+"""What samples may be off by, and is integrated out: an unseen sway, a wandering bias, a pose error."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.evidence import Run
+from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.unseen_sway import sway_shapes
+from rig_identification.estimate.wandering_bias import wander_shapes
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -27,6 +28,15 @@ class Unseen:
     at_samples: Array  # (samples, n - a) ... and the others
 
 
+def read_beside(rig: Rig, run: Run, channel: Channel) -> Array | None:
+    """(N, n) what a device of one turn may read beside it, a std each: the sway, a bias that wanders.
+
+    None where nothing can swing.
+    """
+    sway = sway_shapes(rig, run, channel)
+    return None if sway is None else np.concatenate([sway, wander_shapes(run, channel)], axis=1)
+
+
 def unseen_of(
     rig: Rig, swings: bool, run: Run, which: NDArray[np.int64], axis: NDArray[np.int64], variance: Array
 ) -> Iterator[Unseen]:
@@ -36,7 +46,7 @@ def unseen_of(
     variance (m,): its noise.
     """
     for index, channel in enumerate(run.channels):
-        sway = sway_shapes(rig, run, channel) if swings else None
+        sway = read_beside(rig, run, channel) if swings else None
         wander = channel.wander if index in run.pose_shapes else None
         if sway is None and wander is None:
             continue

@@ -7,8 +7,7 @@ other. So beside the turn a(t), as measured, such a device reads
     (c1 + c3 a) cos(w t) + (c2 + c4 a) sin(w t) + c5 a^2,     w = sqrt(g / h),
 lines at the swing's own frequency, at the sum and the difference of both, and at twice the turn's. A
 gyroscope that is not mounted straight reads its rate. Amplitude and phase of that swing are a run's own, as
-its start is. They are integrated out: with B the shapes, each in units of its std, the samples' errors have
-the covariance I + B B', of which the inverse root is I - U (1 - 1/sqrt(1 + s^2)) U', B = U s V'.
+its start is. They are integrated out (marginal.py).
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.alike_threads import alike_threads
 from rig_identification.estimate.evidence import Channel, Run
+from rig_identification.estimate.marginal import marginal
 from rig_identification.estimate.unseen_swing import SWING
-from rig_identification.estimate.wandering_bias import wander_shapes
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -53,7 +52,7 @@ def sway_shapes(rig: Rig, run: Run, channel: Channel) -> Array | None:
     shapes = np.concatenate([LEANS * swing, turn * swing, LEANS * (turn**2 - np.mean(turn**2))], axis=1)
     if channel.quantity == "angular_rate":
         shapes = np.gradient(shapes, run.grid.step, axis=0)
-    return np.concatenate([shapes, wander_shapes(run, channel)], axis=1)
+    return np.asarray(shapes)
 
 
 def _turn_of(channel: Channel, nodes: Array) -> Array:
@@ -74,10 +73,9 @@ def without_sway(seen: Array, columns: Array) -> float:
     seen (m, n): the shapes at the samples, in the same units. Returns what that adds to the sum of log
     standard deviations.
     """
-    U, s, _ = np.linalg.svd(seen, full_matrices=False)
-    root = np.sqrt(1.0 + s**2)
-    columns -= U @ ((1.0 - 1.0 / root)[:, None] * (U.T @ columns))
-    return float(np.sum(np.log(root)))
+    amounts, doubt = marginal(seen)
+    columns[:] = amounts.without(columns)
+    return doubt
 
 
 def likeliest_sway(seen: Array, residual: Array) -> Array:

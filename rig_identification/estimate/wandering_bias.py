@@ -6,7 +6,7 @@ to 100 degrees an hour. Where force or acceleration is measured as well, they be
 shows at rest (noise_at_rest.py). Where one rate is all there is, a fit of minutes bends to it a swing that
 nothing measures. Half-range cosines of frequencies k / (2 T) hold it over a run of T seconds, each with the
 variance B^2 / (2 pi k) of its share of that density. They are integrated out of a run as an unseen sway is
-(unseen_sway.py), up to half the frequency of the turn itself: beyond, the samples' own noise is larger.
+(unseen.py), up to half the frequency of the turn itself: beyond, the samples' own noise is larger.
 """
 
 from __future__ import annotations

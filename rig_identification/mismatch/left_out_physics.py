@@ -35,8 +35,6 @@ TWISTED = 0.005
 CLAMPED = 0.1
 #: ... and no body is held further askew than this.
 ASKEW = 3.0 * CLAMPED
-#: rad: a flat side faces a body's axis but for so much.
-FACING = 0.5
 #: rad/s: angular momentum of what spins on a body over its own inertia. A rotor of 10 kg and 0.1 m radius at
 #: 3000 rpm has 16 N m s, on a car of 1000 kg and 2 m that is 0.004.
 SPINNING = 0.02

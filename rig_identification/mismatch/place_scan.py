@@ -36,6 +36,12 @@ PLACES, REACH, CLOSER, ROUNDS = 3, 0.6, 0.5, 3
 BEHIND = 0.5
 
 
+def direction(azimuth: float, elevation: float) -> Array:
+    """(3,) unit vector at these angles, rad."""
+    level = np.cos(elevation)
+    return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+
+
 @dataclass(frozen=True)
 class Scales:
     """Sizes that belong to a session: force N, largest travel m and speed m/s of the body's middle."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Candidate, added
-from rig_identification.mismatch.place_scan import Scales
+from rig_identification.mismatch.place_scan import Scales, direction
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: Cd A that is believed to be possible, in squares of the rig's longest side; std (rad) of a normal's angles.
 AREA, FACING = 3.0, 0.5
+#: Name of the amount: one side is in a model at most.
+AREA_NAME = "air.plate_area"
 #: How far air along a side counts at first (air_plate.py): between not at all, 0, and as all other, 1.
 ALONG = 0.7
 #: Directions (azimuth, elevation, rad) that a side is tried to face: along each axis, and between two.
@@ -44,7 +46,7 @@ class Plate:
     def candidate(self, rig: Rig, scales: Scales) -> Candidate:
         """The hypothesis of a side that faces about there."""
         block = layout.effects_offset(len(rig.cables))
-        area = added("air.plate_area", "m^2", AREA * scales.size**2, block + place.AIR_PLATE)
+        area = added(AREA_NAME, "m^2", AREA * scales.size**2, block + place.AIR_PLATE)
         angles = tuple(
             added(f"air.plate_{name}", "rad", FACING, block + place.AIR_PLATE_NORMAL + i, self.normal[i])
             for i, name in enumerate(("azimuth", "elevation"))
@@ -54,7 +56,7 @@ class Plate:
             for i, (a, at) in enumerate(zip(AXES, middle_of(rig), strict=True))
         )
         along = added("air.plate_along", "1", 0.5, block + place.AIR_PLATE_ALONG, ALONG)
-        axis = AXES[int(np.argmax(np.abs(_direction(self.normal))))]
+        axis = AXES[int(np.argmax(np.abs(direction(*self.normal))))]
         return Candidate(
             "air_drag",
             (area, *angles, *point, along),
@@ -80,7 +82,7 @@ class Plate:
 
     def wrenches(self, model: RigModel, motion: Motion, at: Array, scales: Scales) -> Array:
         """(N, 6, 1) wrench about the datum, body axes, of a std of its area (model/effects/air_plate.py)."""
-        x, n = motion.states, _direction(self.normal)
+        x, n = motion.states, direction(*self.normal)
         v = np.einsum("nji,nj->ni", motion.R_world_body, x[:, layout.VELOCITY : layout.VELOCITY + 3])
         v = v + np.cross(x[:, layout.RATE : layout.RATE + 3], at)
         u = v @ n
@@ -91,10 +93,3 @@ class Plate:
 
 #: Sides that are tried at every place.
 PLATES = tuple(Plate(normal) for normal in NORMALS)
-
-
-def _direction(normal: tuple[float, float]) -> Array:
-    """(3,) unit vector."""
-    azimuth, elevation = normal
-    level = np.cos(elevation)
-    return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])

@@ -23,7 +23,7 @@ from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.findings import written
-from rig_identification.mismatch.place_scan import Scales, followed
+from rig_identification.mismatch.place_scan import Scales, direction, followed
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -193,15 +193,9 @@ LAWS = (
 )
 
 
-def _direction(azimuth: float, elevation: float) -> Array:
-    """(3,) unit vector of a line."""
-    level = np.cos(elevation)
-    return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
-
-
 def _pulls(u: Array, azimuth: float, elevation: float) -> Array:
     """(N, 3, 3) force of a unit of each part of a spring at travels ``u`` (N, 3), world."""
-    d = _direction(azimuth, elevation)
+    d = direction(azimuth, elevation)
     s = (u @ d)[:, None]
     return np.asarray(-np.concatenate([s, s**2, s**3], axis=1)[:, None, :] * d[:, None])
 

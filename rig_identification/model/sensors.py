@@ -264,6 +264,17 @@ class MocapMount:
     world_position: Array  # (3,) m, origin of world in the tracker frame
     R_tracker_world: Array  # (3, 3)
 
+    def off_by(self, errors: Array) -> MocapMount:
+        """The mount with errors (12,): marker position m (body), marker rotation (rad, body axes, left),
+        world position m (tracker), world rotation (rad, tracker axes, left).
+        """
+        return MocapMount(
+            self.marker_position + errors[0:3],
+            Rotation.from_rotvec(errors[3:6]).as_matrix() @ self.R_body_marker,
+            self.world_position + errors[6:9],
+            Rotation.from_rotvec(errors[9:12]).as_matrix() @ self.R_tracker_world,
+        )
+
 
 def mocap(
     raw: Array, R_world_body: Array, mount: MocapMount, R_tracker_mean: Array, device: Array
@@ -271,13 +282,15 @@ def mocap(
     """Pose (N, 6) of the marker frame in the tracker frame: position m, rotation vector about the mean rad.
 
     R_tracker_mean (3, 3): orientation about which rotation vectors are taken, so that they
-    stay short. device (12,): errors of the mount: marker position m (body), marker rotation (rad, body
-    axes, left), world position m (tracker), world rotation (rad, tracker axes, left).
+    stay short. device (12,): errors of the mount (:meth:`MocapMount.off_by`).
     """
-    r = mount.marker_position + device[0:3]
-    R_bm = Rotation.from_rotvec(device[3:6]).as_matrix() @ mount.R_body_marker
-    R_tw = Rotation.from_rotvec(device[9:12]).as_matrix() @ mount.R_tracker_world
-    shift = mount.world_position + device[6:9]
+    really = mount.off_by(device)
+    r, R_bm, shift, R_tw = (
+        really.marker_position,
+        really.R_body_marker,
+        really.world_position,
+        really.R_tracker_world,
+    )
     marker_world = raw[:, POSITION] + R_world_body @ r
     position = marker_world @ R_tw.T + shift
     R_tb = R_tw @ R_world_body

@@ -12,8 +12,8 @@ from rig_identification.estimate.solve import POLISH, Problem, solve
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.place_scan import best_places
-from rig_identification.mismatch.plates import PLATES
+from rig_identification.mismatch.place_scan import Shape, best_places
+from rig_identification.mismatch.plates import AREA_NAME, PLATES
 from rig_identification.mismatch.point_laws import LAWS, law_finding, parts_of, sparser
 from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.trial import LAST_STEPS, Trial, in_stds, log_evidence, mass_of
@@ -25,14 +25,11 @@ def promised_laws(rung: Rung, found: tuple[Candidate, ...]) -> list[Promise]:
 
     None of what it has already.
     """
-    shapes = () if any(parts_of(c) for c in found) else LAWS
+    laws = () if any(parts_of(c) for c in found) else LAWS
     taken = {q.name for q in rung.problem.bench.parameters.free}
+    shapes: tuple[Shape, ...] = (*laws, *(() if AREA_NAME in taken else PLATES))
     mass = mass_of(rung.problem, rung.evaluation)
-    return [
-        promise
-        for promise in best_places(rung.problem, rung.evaluation, mass, (*shapes, *PLATES))
-        if not taken & {q.name for q in promise.candidate.parameters}
-    ]
+    return best_places(rung.problem, rung.evaluation, mass, shapes) if shapes else []
 
 
 def sparse(problem: Problem, found: list[Trial], budget: Budget) -> list[Trial]:
