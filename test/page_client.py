@@ -7,7 +7,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,7 +69,10 @@ class Client:
         try:
             connection.request(method, path, body, sent)
             got = connection.getresponse()
-            return Answer(got.status, {k.lower(): v for k, v in got.getheaders()}, got.read())
+            body = b""
+            with suppress(ConnectionResetError):  # a refused request is closed before it is read
+                body = got.read()
+            return Answer(got.status, {k.lower(): v for k, v in got.getheaders()}, body)
         finally:
             connection.close()
 

@@ -88,7 +88,9 @@ def inertial_estimate(problem: Problem, evaluation: Evaluation) -> InertialEstim
     theta = evaluation.point.theta
     left = share_left(problem, evaluation)
     believed = {name for i, name in enumerate(CENTER, start=CENTER_ENTRY) if i in problem.taken}
-    lost = tuple(n for n, share in zip(ELEMENTS, left, strict=True) if n in believed or not share < GAIN)
+    lost = with_products(
+        {n for n, share in zip(ELEMENTS, left, strict=True) if n in believed or not share < GAIN}
+    )
     elements = problem.bench.parameters.elements(theta)
     beside = beside_middle(problem, elements)
     covariance = elements_covariance(problem, evaluation) + np.outer(beside, beside)

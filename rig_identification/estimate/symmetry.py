@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.model.equilibrium import design_pose
 from rig_identification.model.motion import RigModel, rig_model
+from rig_identification.model.so3 import nearest_rotation
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -98,8 +99,7 @@ def _best_turn(points: Array, there: Array, up: Array) -> Array:
 
     Points on a line or in a plane leave that open; they have the say in all else.
     """
-    U, _, Vt = np.linalg.svd(there.T @ points + LITTLE * np.sum(points**2) * np.outer(up, up))
-    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
+    return nearest_rotation(there.T @ points + LITTLE * np.sum(points**2) * np.outer(up, up))
 
 
 def _any_body(rig: Rig) -> RigModel:

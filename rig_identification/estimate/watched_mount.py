@@ -18,6 +18,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import seen_pose
 from rig_identification.estimate.track import Track
 from rig_identification.model.sensors import MocapMount
+from rig_identification.model.so3 import nearest_rotation
 
 Array = NDArray[np.float64]
 
@@ -66,5 +67,4 @@ def _best_rotation(pairs: list[tuple[Array, Array]]) -> Array:
     total = np.zeros((3, 3))
     for body, marker in pairs:
         total += body.T @ marker / max(float(np.sum(marker**2)), 1e-12)
-    U, _, Vt = np.linalg.svd(total)
-    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U) * np.linalg.det(Vt)]) @ Vt)
+    return nearest_rotation(total)

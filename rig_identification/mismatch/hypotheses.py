@@ -80,17 +80,27 @@ def count_of(candidates: list[Candidate]) -> int:
     return len(candidates) + len(SWINGS)
 
 
-def needed_gain(candidate: Candidate, count: int) -> float:
+def needed_gain(candidate: Candidate, count: int, numbers: int | None = None) -> float:
     """Gain (nats) that noise exceeds with chance FALSE_ALARM over ``count`` trials (Wilks).
 
     Bonferroni's correction, weighted (Genovese, Roeder and Wasserman, Biometrika 93, 2006): what the lab
     doubts itself is likelier wrong than what it leaves out. What every rig has some of is a family of its
-    own: no chance among many, of that only the amount is asked.
+    own: no chance among many, of that only the amount is asked. numbers: of the candidate's, all by default.
     """
     share = 1.0 / EVERYWHERE if candidate.everywhere else (DOUBTED if candidate.doubted else 1.0) / count
-    return 0.5 * float(chi2.isf(FALSE_ALARM * share, len(candidate.parameters)))
+    numbers = len(candidate.parameters) if numbers is None else numbers
+    return 0.5 * float(chi2.isf(FALSE_ALARM * share, numbers))
 
 
 def net_gain(promise: Promise, count: int) -> float:
-    """What a promise gains (nats) beyond what noise gives one of ``count``."""
-    return promise.gain - needed_gain(promise.candidate, count)
+    """What a promise gains (nats) beyond what noise gives one of ``count``.
+
+    What it adds has to earn its keep beside what it frees (a test of nested models): with its cells' zeros
+    free, a law of two cells that feel each other would explain whatever shifts them.
+    """
+    candidate = promise.candidate
+    net = promise.gain - needed_gain(candidate, count)
+    if promise.of_added is None:
+        return net
+    added = sum(not q.freed for q in candidate.parameters)
+    return min(net, promise.of_added - needed_gain(candidate, count, added))

@@ -20,6 +20,16 @@ def skew(v: Array) -> Array:
     return out
 
 
+def nearest_rotation(matrix: Array) -> Array:
+    """(3, 3) proper rotation R for which trace(R' matrix) is largest.
+
+    Of a sum of y x' it is the one that brings the vectors x best to the y (Wahba's problem, by singular
+    values: Markley, Journal of the Astronautical Sciences 36, 1988).
+    """
+    U, _, Vt = np.linalg.svd(matrix)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt)
+
+
 def left_jacobian(phi: Array) -> Array:
     """(3, 3): Exp(phi + d) = Exp(J_l(phi) d) Exp(phi) to first order."""
     angle = float(np.linalg.norm(phi))

@@ -19,6 +19,9 @@ from typing import NoReturn
 
 from rig_identification.errors import InputError
 
+#: File descriptor of standard output.
+STDOUT = 1
+
 
 class Voice:
     """Says one whole line at a time: an interrupt waits until the line is out."""
@@ -29,13 +32,15 @@ class Voice:
 
     def say(self, kind: str, **content: object) -> None:
         """Write a line. Raises KeyboardInterrupt, after it, where SIGINT came meanwhile."""
-        text = json.dumps({"kind": kind, **content}, allow_nan=False)
+        line = json.dumps({"kind": kind, **content}, allow_nan=False).encode() + b"\n"
         main = threading.current_thread() is threading.main_thread()  # signals are heeded there alone
         if main:
             self._speaking = True
         try:
             with self._lock:
-                print(text, flush=True)
+                # Past the buffers of sys.stdout, which a signal between two pieces of a line can leave torn
+                while line:
+                    line = line[os.write(STDOUT, line) :]
         finally:
             if main:
                 self._speaking = False

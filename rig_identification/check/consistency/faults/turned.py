@@ -27,6 +27,7 @@ from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import BIAS
 from rig_identification.check.consistency.trajectory import Trajectory, rotation
 from rig_identification.examination import SetupFault
+from rig_identification.model.so3 import nearest_rotation
 from rig_identification.quantity import with_interval
 from rig_identification.rig import Mount, Rig
 from rig_identification.statics.balance import skew
@@ -201,7 +202,8 @@ def mounted(
         if hangs is not None:
             std = BIAS * float(np.linalg.norm(hangs[1]))
             pairs.append((hangs[0][None] / std, hangs[1][None] / std))
-        R = _rotation(np.vstack([seen for seen, _ in pairs]), np.vstack([true for _, true in pairs]))
+        seen, true = (np.vstack([pair[k] for pair in pairs]) for k in (0, 1))
+        R = nearest_rotation(true.T @ seen)
         if size is not None:
             place = _place(along.lever, read[:, 3:] @ R.T - along.proper, described.position, size)
     return Mount(place, Rotation.from_matrix(R).as_quat())
@@ -231,13 +233,6 @@ def _weighed(seen: Array, true: Array) -> tuple[Array, Array]:
 
 def _about_mean(rows: Array) -> Array:
     return np.asarray(rows - rows.mean(axis=0))
-
-
-def _rotation(seen: Array, true: Array) -> Array:
-    """(3, 3) proper rotation R with R seen = true in least squares, rows (n, 3)."""
-    left, _, right = np.linalg.svd(true.T @ seen)
-    proper = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return np.asarray(left @ proper @ right)
 
 
 def _place(lever: Array, miss: Array, described: Array, size: float) -> Array:
