@@ -143,9 +143,17 @@ def _fitted(devices: dict[Key, list[Bands]]) -> Fit:
         own = np.eye(first[-1])[first[k] : first[k + 1]]
         shape = np.mean(_cosines(there, found.size - first[-1]), axis=0)
         rows = np.concatenate([own, np.tile(shape, (own.shape[0], 1))], axis=1)
-        above, std = rows @ found, np.sqrt(np.einsum("ij,jk,ik->i", rows, inverse, rows))
-        factors[key] = np.where(above > CHANCE * std, np.exp(0.5 * np.maximum(above, 0.0)), 1.0)
+        above = rows @ found
+        # Axes of one device share its electronics: where all of them together are above, each is
+        shown = [_shown(row, found, inverse) for row in rows]
+        told = np.array(shown) | _shown(np.mean(rows, axis=0), found, inverse)
+        factors[key] = np.where(told, np.exp(0.5 * np.maximum(above, 0.0)), 1.0)
     return Fit(criterion, factors)
+
+
+def _shown(row: Array, found: Array, inverse: Array) -> bool:
+    """Whether a combination ``row`` of what was found lies above 0 by more than chance."""
+    return bool(row @ found > CHANCE * np.sqrt(row @ inverse @ row))
 
 
 def _cosines(angle: Array, count: int) -> Array:

@@ -419,7 +419,7 @@ def _in_a_sentence(text: str) -> str:
 
 
 def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]) -> Candidate:
-    """Something is put on the body, or taken off it."""
+    """Something is put on the body, taken off it, or moved on it."""
     names = [p.name for p in own]
 
     def place(axis: int, *numbers: float) -> float:
@@ -427,6 +427,8 @@ def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]
 
     def told(found: Estimates) -> Told:
         out: Told = {"mass": (*found.of(names[0]), "kg")}
+        for name, a in zip(names[1:4], AXES, strict=True):
+            out[f"first_moment_{a}"] = (*found.of(name), "kg*m")
         if abs(found.values[names[0]]) > 3.0 * found.std(names[0]):
             for i, a in enumerate(AXES):
                 out[f"position_{a}"] = (*found.following(lambda *v, i=i: place(i, *v), *names[:4]), "m")
@@ -435,7 +437,9 @@ def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]
     return Candidate(
         "unknown",
         own,
-        f"{since}: the body is heavier by {{value}} than before, or its load has moved.",
+        f"{since}: the body is heavier by {{value}} than before, and its first moment of mass is another one: "
+        "by {told[first_moment_x]}, {told[first_moment_y]} and {told[first_moment_z]} along x, y and z. "
+        "A load was put on, taken off, or has moved.",
         "Fasten what lies on it, and record everything with the same load.",
         {"channel": None, "axis": None, "law": "changed load", "times": times},
         tell=told,

@@ -9,6 +9,7 @@ from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.solve import Problem, excess
+from rig_identification.estimate.verdict import Heard, hear, weighed_otherwise
 from rig_identification.mismatch.trial import Trial
 from rig_identification.result import Mismatch
 
@@ -53,6 +54,18 @@ def only_a_trace(ideal: Fitted, fitted: Fitted, square: float = TRACE_SQUARE) ->
     share = excess(fitted.evaluation) / max(excess(ideal.evaluation), 1.0)
     allowed = max(square, NEXT_TO_NONE_SQUARE) if share < NEXT_TO_NONE else square
     return fitted.converged and share < TRACE and misfit(fitted.evaluation) < allowed
+
+
+def trace_of(ideal: Fitted, fitted: Fitted) -> Heard | None:
+    """What is heard of a fit that leaves but a trace; None: its residuals show more than that.
+
+    What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is a
+    held-out run that cannot be followed, of which there is no residual to hear.
+    """
+    if fitted.lost or weighed_otherwise(fitted) is not None or not only_a_trace(ideal, fitted):
+        return None
+    heard = hear(fitted)
+    return None if heard.contradicted else heard
 
 
 def held_out_errors(before: float | None, after: float | None) -> str:

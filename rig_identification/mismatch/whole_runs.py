@@ -12,10 +12,10 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import ORDINARY, Ideal, judged
 from rig_identification.estimate.mixture import Bodies
 from rig_identification.estimate.solve import Point, Problem
-from rig_identification.estimate.verdict import hear, weighed_otherwise
+from rig_identification.estimate.verdict import hear
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.budget import Budget
-from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, only_a_trace
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, trace_of
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
 from rig_identification.mismatch.screen import carried, extended
@@ -81,12 +81,8 @@ def fitted_whole(
         # What says most comes first, whatever was found first. Without its effect an error goes to its bound
         bounds = {name: ORDINARY * std for name, std in ordinary_errors(named.problem).items()}
         found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
-    # What the ground scale contradicts is no trace, though it is one number among a hundred thousand; nor is
-    # a held-out run that cannot be followed, of which there is no residual to hear
-    trace = verdict.verdict != "none" and weighed_otherwise(fitted) is None and not fitted.lost
-    heard = hear(fitted) if trace and only_a_trace(ideal.fitted, fitted) else None
-    trace = heard is not None and not heard.contradicted
-    loose = heard.looseness if heard is not None and trace else 1.0
+    heard = trace_of(ideal.fitted, fitted) if verdict.verdict != "none" else None
+    trace, loose = heard is not None, 1.0 if heard is None else heard.looseness
     findings = _findings(ideal, fitted, found, after.holdout, loose)
     effects = effects_of(findings)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)

@@ -23,7 +23,7 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, sol
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.changes import Change, likeliest_changes, recordings_of
-from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
+from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, trace_of
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
 from rig_identification.mismatch.pulse import all_runs
@@ -42,6 +42,8 @@ Explain = Callable[[Ideal], Explained | None]
 #: Share of what a change takes away that another one, to first order, may fail to take away and be fitted in
 #: its stead: of a change of hundreds of standard deviations first order knows no more.
 ALIKE = 0.02
+#: Share of what is wrong that may be left beside a change that is told, though that is more than a trace.
+LITTLE = 0.02
 #: Half of what is cut out about the instant of a change, s: so exactly is it known.
 ABOUT = 0.1
 
@@ -119,8 +121,12 @@ def explained_changed(
     best = _simpler(fitted, best, notify)
     rest = Ideal(best.fitted, *judged(best.fitted))
     told = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
-    if told.mismatch.verdict not in ("none", "explained") or told.trace:
-        return None
+    if told.mismatch.verdict == "unexplained":
+        heard = trace_of(fitted, told.fitted)
+        if heard is not None:
+            told = replace(told, trace=True, loose=heard.looseness)
+        elif wrong(told.fitted) > LITTLE * wrong(fitted):
+            return None
     return _with_change(told, ideal, best)
 
 
@@ -214,14 +220,19 @@ def _with_change(found: Explained, ideal: Ideal, change: Changed) -> Explained:
     evidence = {**evidence_of(ideal, fitted, after), "log_likelihood_gain": gain}
     trial = Trial(change.candidate, fitted.problem, fitted.evaluation, log_evidence(fitted.evaluation))
     told: Finding = finding(trial, estimates(fitted.problem, fitted.evaluation), evidence)
-    beside = f"{found.mismatch.explanation} " if found.mismatch.findings else ""
+    beside = f"{found.mismatch.explanation} " if found.mismatch.verdict != "none" else ""
+    unexplained = found.mismatch.verdict == "unexplained" and not found.trace
+    left = (
+        "a part is left" if unexplained else "a trace is left" if found.trace else "every residual is noise"
+    )
     text = (
-        "Something changed while the session was recorded; with that every residual is noise. "
+        f"Something changed while the session was recorded; with that {left}. "
         f"{beside}{held_out_errors(ideal.scores.holdout, after)}"
     )
     if change.own:
         text += " The held-out recording itself tells the change: nothing else of the model is fitted to it."
-    mismatch = Mismatch("explained", text, (told, *found.mismatch.findings), found.mismatch.alternatives)
+    verdict = "unexplained" if unexplained else "explained"
+    mismatch = Mismatch(verdict, text, (told, *found.mismatch.findings), found.mismatch.alternatives)
     return replace(found, mismatch=mismatch, ideal=ideal)
 
 

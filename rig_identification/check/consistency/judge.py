@@ -53,20 +53,40 @@ class Verdict:
 def judged(session: RawSession) -> Verdict:
     """Find what channels show against each other and against the description."""
     out: list[Found] = []
+    evidence = _evidence(session)
     for _ in range(ROUNDS):
-        small = reduced(session)
-        if not small.recordings or not small.at_rest:
+        if evidence is None:
             return Verdict(tuple(out), None)
-        evidence = Evidence(small)
         weighed = _weighed(evidence)
-        if not weighed or weighed[0].net <= 0.0:
+        for best in weighed:
+            if best.net <= 0.0:
+                return Verdict(tuple(out), evidence)
+            corrected = _changes(best).raw(session)
+            after = _evidence(corrected)
+            if _holds(best, evidence, after):
+                break
+        else:
             return Verdict(tuple(out), evidence)
-        told = _told(weighed[0], weighed[1:])
+        told = _told(best, [w for w in weighed if w is not best])
         if any(_same(told, found.fault) for found in out):
             return Verdict(tuple(out), evidence)
-        session = _changes(weighed[0]).raw(session)
+        session, evidence = corrected, after
         out.append(Found(told, session))
     return Verdict(tuple(out), None)
+
+
+def _evidence(session: RawSession) -> Evidence | None:
+    small = reduced(session)
+    return Evidence(small) if small.recordings and small.at_rest else None
+
+
+def _holds(best: Weighed, before: Evidence, after: Evidence | None) -> bool:
+    """Whether the session hangs together better by the hypothesis's price once its readings are put right.
+
+    A belief that is given up lets the numbers of each part of the evidence go their own way: a gain that rest
+    leaves at nothing and forces bend to their noise is no fault.
+    """
+    return after is None or before.plain.cost - after.plain.cost > best.gain - best.net
 
 
 def _same(one: SetupFault, other: SetupFault) -> bool:
