@@ -10,7 +10,7 @@ from test_model_rigs import thesis_case_14
 
 from rig_identification.estimate.first_guess import rest_of
 from rig_identification.estimate.identify import pose_problem
-from rig_identification.estimate.mounting import mounted, mounted_change
+from rig_identification.estimate.mounting import Answer, mounted, mounted_change
 from rig_identification.estimate.prediction import linearise_run, model_at
 from rig_identification.mismatch.screen import extended
 from rig_identification.mismatch.soft_mount import soft_mounts
@@ -37,7 +37,7 @@ def test_it_shows_what_the_equation_of_motion_says(frequency: float, error: floa
 
     found = solve_ivp(law, (0.0, 12.0), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=2e-3)
     device = -2.0 * z * w * found.y[1] - w * w * found.y[0]
-    shown = mounted(STEP, w**-2, z, shaken(time)[:, None])[:, 0]
+    shown = mounted(STEP, Answer(w**-2, z), shaken(time)[:, None])[:, 0]
     own = np.std(device - shaken(time))
     assert own > 0.003
     assert np.std(shown - device) < error * own
@@ -46,9 +46,9 @@ def test_it_shows_what_the_equation_of_motion_says(frequency: float, error: floa
 def test_a_stiff_mount_shows_the_motion_itself_and_a_soft_one_more() -> None:
     time = np.arange(0.0, 10.0, STEP)
     swing = np.sin(2.0 * np.pi * 1.0 * time)[:, None]
-    assert mounted(STEP, 0.0, 0.1, swing) is swing
+    assert mounted(STEP, Answer(0.0, 0.1), swing) is swing
     for frequency in (6.0, 12.0, 40.0):
-        shown = mounted(STEP, (2.0 * np.pi * frequency) ** -2, 0.1, swing)[500:]
+        shown = mounted(STEP, Answer((2.0 * np.pi * frequency) ** -2, 0.1), swing)[500:]
         assert np.max(shown) == pytest.approx(1.0 / (1.0 - frequency**-2.0), rel=3e-3)
 
 
@@ -56,12 +56,12 @@ def test_derivatives_of_a_run_are_those_of_its_residuals() -> None:
     problem, theta, _ = pose_problem(recorded(thesis_case_14(), duration=3.0)[0])
     quantities = {c.quantity for run in problem.runs for c in run.channels}
     *_, both = soft_mounts(problem.bench.parameters, quantities)
-    assert len(both.parameters) == 4
+    assert len(both.parameters) == 6
     wide = extended(problem, (both,))
     parameters, run = wide.bench.parameters, wide.runs[0]
     there = parameters.converted(theta, problem.bench.parameters)
     columns = [parameters.index_of(p.name) for p in both.parameters]
-    there[columns[:2]] = 0.7, 0.5
+    there[columns] = 0.7, 0.5, 0.3, -0.4, 0.5, 0.8
     start = rest_of(model_at(parameters, there))
 
     def residual(theta: np.ndarray) -> np.ndarray:
@@ -80,11 +80,28 @@ def test_derivatives_of_a_run_are_those_of_its_residuals() -> None:
         np.testing.assert_allclose(numeric, -own, atol=2e-3 * np.abs(own).max())
 
 
-def test_its_change_is_its_derivative() -> None:
-    values = shaken(np.arange(0.0, 6.0, STEP))[:, None]
-    for k in (-2e-4, 6e-4):
-        in_k, in_damping = mounted_change(STEP, k, 0.1, values)
-        near = (mounted(STEP, k + 1e-7, 0.1, values) - mounted(STEP, k - 1e-7, 0.1, values)) / 2e-7
-        np.testing.assert_allclose(in_k, near, rtol=1e-3, atol=1e-3 * np.abs(near).max())
-        near = (mounted(STEP, k, 0.1001, values) - mounted(STEP, k, 0.0999, values)) / 2e-4
-        np.testing.assert_allclose(in_damping, near, rtol=1e-3, atol=1e-3 * max(np.abs(near).max(), 1e-9))
+def test_a_device_whose_own_filter_rings_answers_as_that_filter() -> None:
+    """w^2/(s^2 + 2 z w s + w^2): the damper does not stand on the body."""
+    w, z, time = 2.0 * np.pi * 7.5, 0.07, np.arange(0.0, 12.0, STEP)
+
+    def law(t: float, x: np.ndarray) -> list[float]:
+        return [x[1], w * w * (float(shaken(t)) - x[0]) - 2.0 * z * w * x[1]]
+
+    found = solve_ivp(law, (0.0, 12.0), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=2e-3)
+    shown = mounted(STEP, Answer(w**-2, z, 2.0 * z / w), shaken(time)[:, None])[:, 0]
+    own = np.std(found.y[0] - shaken(time))
+    assert own > 0.01
+    assert np.std(shown - found.y[0]) < 0.05 * own
+    on_rubber = mounted(STEP, Answer(w**-2, z), shaken(time)[:, None])[:, 0]
+    assert np.std(on_rubber - found.y[0]) > 0.3 * own
+
+
+@pytest.mark.parametrize("k", [-2e-4, 0.0, 6e-4])
+def test_its_change_is_its_derivative(k: float) -> None:
+    values, there = shaken(np.arange(0.0, 6.0, STEP))[:, None], Answer(k, 0.1, 2e-3)
+    for field, change, own in zip(
+        Answer._fields, mounted_change(STEP, there, values), (1e-7, 1e-4, 1e-5), strict=True
+    ):
+        more, less = (there._replace(**{field: getattr(there, field) + s * own}) for s in (1.0, -1.0))
+        near = (mounted(STEP, more, values) - mounted(STEP, less, values)) / (2.0 * own)
+        np.testing.assert_allclose(change, near, rtol=1e-3, atol=1e-3 * max(np.abs(near).max(), 1e-9))

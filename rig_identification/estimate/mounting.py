@@ -1,14 +1,19 @@
-"""A device on a soft mount: it moves as a mass on a damped spring does whose foot the body shakes.
+"""A device that answers as a mass on a damped spring does: on a soft mount, or within its own case.
 
 Of what the body does, u, the device shows y = u + g with
-    G(s) = -s^2/(s^2 + 2 z w s + w^2),    k = 1/w^2,
-w the mount's natural angular frequency and z its damping ratio. Far below resonance y = u - k d2u/dt2: a
-swing at angular frequency W looks too large by (W/w)^2. k = 0 is a rigid mount; a fit may pass through
-negative k, where that first order is continued, and a mount that rings faster than the nodes tell is taken to
-first order as well. Only g is filtered, by straight lines between nodes: u itself is not cut at its peaks.
+    G(s) = -(s^2 + T w^2 s)/(s^2 + 2 z w s + w^2),    k = 1/w^2,
+w the natural angular frequency, z the damping ratio and T a delay. Where the damper stands on the body, as
+rubber under a device does, T = 0. Where it does not, as in the seismic mass of an accelerometer or a filter
+of second order behind it, T = 2 z/w and y/u = w^2/(s^2 + 2 z w s + w^2). Far below resonance
+y = u - T du/dt - k d2u/dt2: a swing at angular frequency W looks too large by (W/w)^2, and late by T. k = 0
+is a rigid mount; a fit may pass through negative k, where that first order is continued, and a mount that
+rings faster than the nodes tell is taken to first order as well. Only g is filtered, by straight lines
+between nodes: u itself is not cut at its peaks.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,28 +30,45 @@ FOLLOWED = 1.0
 MOVED = 1e-3
 
 
-def mounted(step: float, k: float, damping: float, values: Array) -> Array:
-    """What a device on a mount of ``k`` (s^2) shows of ``values`` (N, c), ``step`` seconds apart."""
-    if k == 0.0:
+class Answer(NamedTuple):
+    """The three numbers of such an answer."""
+
+    k: float = 0.0  # 1/w^2, s^2
+    damping: float = 0.0  # z
+    delay: float = 0.0  # T, s
+
+
+def mounted(step: float, answer: Answer, values: Array) -> Array:
+    """What a device that answers so shows of ``values`` (N, c), ``step`` seconds apart."""
+    k, damping, delay = answer
+    if k == 0.0 and delay == 0.0:
         return values
     if not _rings(step, k):
-        return np.asarray(values - k * _second(step, values))
+        return np.asarray(values - k * _second(step, values) - delay * _first(step, values))
     w, z = 1.0 / np.sqrt(k), max(damping, LEAST_DAMPING)
-    b, a, _ = cont2discrete(([-1.0, 0.0, 0.0], [1.0, 2.0 * z * w, w * w]), step, method="foh")
+    b, a, _ = cont2discrete(([-1.0, -delay * w * w, 0.0], [1.0, 2.0 * z * w, w * w]), step, method="foh")
     b = np.ravel(b)
     # It has hung still with what it shows at first
     rest = lfilter_zi(b, a)[:, None] * values[:1]
     return np.asarray(values + lfilter(b, a, values, axis=0, zi=rest)[0])
 
 
-def mounted_change(step: float, k: float, damping: float, values: Array) -> tuple[Array, Array]:
-    """Derivatives of :func:`mounted` in ``k`` and in ``damping``, each (N, c)."""
+def mounted_change(step: float, answer: Answer, values: Array) -> tuple[Array, Array, Array]:
+    """Derivatives of :func:`mounted` in ``k``, ``damping`` and ``delay``, each (N, c)."""
+    k, damping, _ = answer
+    in_delay = mounted(step, answer._replace(delay=1.0), values) - mounted(
+        step, answer._replace(delay=0.0), values
+    )
     if not _rings(step, k):
-        return -_second(step, values), np.zeros_like(values)
+        return -_second(step, values), np.zeros_like(values), in_delay
     own, other = MOVED * k, MOVED * max(damping, LEAST_DAMPING)
-    in_k = mounted(step, k + own, damping, values) - mounted(step, k - own, damping, values)
-    in_damping = mounted(step, k, damping + other, values) - mounted(step, k, damping - other, values)
-    return in_k / (2.0 * own), in_damping / (2.0 * other)
+
+    def between(less: Answer, more: Answer, by: float) -> Array:
+        return np.asarray((mounted(step, more, values) - mounted(step, less, values)) / by)
+
+    in_k = between(answer._replace(k=k - own), answer._replace(k=k + own), 2.0 * own)
+    softer, harder = answer._replace(damping=damping - other), answer._replace(damping=damping + other)
+    return in_k, between(softer, harder, 2.0 * other), in_delay
 
 
 def _rings(step: float, k: float) -> bool:
@@ -59,3 +81,10 @@ def _second(step: float, values: Array) -> Array:
         return np.zeros_like(values)
     inside = np.diff(values, 2, axis=0) / step**2
     return np.concatenate([inside[:1], inside, inside[-1:]])
+
+
+def _first(step: float, values: Array) -> Array:
+    """(N, c) first derivative of ``values``."""
+    if values.shape[0] < 2:
+        return np.zeros_like(values)
+    return np.asarray(np.gradient(values, step, axis=0))

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.mounting import Answer
 from rig_identification.model import layout
 from rig_identification.model import sensors as devices
 from rig_identification.model.body import (
@@ -113,6 +114,7 @@ _SIZES = {"imu": devices.IMU_SIZE, "inclinometer": devices.INCLINOMETER_SIZE, "m
 _AXES = {"imu": 6, "inclinometer": 2, "mocap": 0}
 #: Quantities of the IMU that a soft mount changes, each by its own resonance.
 MOUNTED = ("specific_force", "angular_rate")
+MOUNT_SIZE = len(Answer._fields)
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,7 @@ class DeviceLayout:
     @property
     def size(self) -> int:
         """Length of the flat array."""
-        return self.mount(MOUNTED[-1]) + 2
+        return self.mount(MOUNTED[-1]) + MOUNT_SIZE
 
     def clock(self, device: str) -> int:
         """Entry of a device's clock offset."""
@@ -231,8 +233,8 @@ class DeviceLayout:
         return self.exciter_clock + 1 + len(self.cables) + order.index(device)
 
     def mount(self, quantity: str) -> int:
-        """Entry of the IMU's mount as a ``quantity`` shows it: 1/w^2 (s^2), then damping (mounting.py)."""
-        return self.lag("exciter") + 1 + 2 * MOUNTED.index(quantity)
+        """First entry of the IMU's mount as a ``quantity`` shows it: 1/w^2 (s^2), damping, delay (s)."""
+        return self.lag("exciter") + 1 + MOUNT_SIZE * MOUNTED.index(quantity)
 
 
 @dataclass

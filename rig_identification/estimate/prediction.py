@@ -14,8 +14,8 @@ from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.force_noise import Discrepancy, RandomWrench, random_wrench
 from rig_identification.estimate.lag import lagged, settling_cost, unsettled
 from rig_identification.estimate.marginal import Marginal, marginal
-from rig_identification.estimate.mounting import mounted, mounted_change
-from rig_identification.estimate.parameters import MOUNTED, DeviceLayout, ParameterSet
+from rig_identification.estimate.mounting import Answer, mounted, mounted_change
+from rig_identification.estimate.parameters import MOUNT_SIZE, MOUNTED, DeviceLayout, ParameterSet
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
@@ -239,25 +239,25 @@ def _channel_rows(
     for i in np.flatnonzero((entries == clock) | (entries == lag)):
         shown = values if entries[i] == clock else lagged(step, tau, values)
         out[:, :, 1 + columns[i]] -= scale[i] * (slope @ shown)
-    if soft is not None and np.any(of_mount := (entries == soft) | (entries == soft + 1)):
-        changes = mounted_change(step, *mount, reading.values[:, reads])
+    if soft is not None and np.any(of_mount := (entries >= soft) & (entries < soft + MOUNT_SIZE)):
+        changes = mounted_change(step, mount, reading.values[:, reads])
         for i in np.flatnonzero(of_mount):
             out[:, :, 1 + columns[i]] += scale[i] * (value @ lagged(step, tau, changes[entries[i] - soft]))
     return out, H, D
 
 
-def mount_of(channel: Channel, own: Array, places: DeviceLayout) -> tuple[int | None, tuple[float, float]]:
+def mount_of(channel: Channel, own: Array, places: DeviceLayout) -> tuple[int | None, Answer]:
     """First entry of the mount that a channel is seen through, and its numbers there; None: it is rigid."""
     if channel.quantity not in MOUNTED:
-        return None, (0.0, 0.0)
+        return None, Answer()
     first = places.mount(channel.quantity)
-    return first, (float(own[first]), float(own[first + 1]))
+    return first, Answer(*own[first : first + MOUNT_SIZE].tolist())
 
 
 def device_shows(step: float, channel: Channel, own: Array, places: DeviceLayout, values: Array) -> Array:
     """What a device shows of ``values`` (N, c) at nodes ``step`` s apart, through its mount and its lag."""
     _, mount = mount_of(channel, own, places)
-    return lagged(step, float(own[places.lag(channel.device)]), mounted(step, *mount, values))
+    return lagged(step, float(own[places.lag(channel.device)]), mounted(step, mount, values))
 
 
 def longest_step(run: Run) -> float:

@@ -437,7 +437,7 @@ def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]
     return Candidate(
         "unknown",
         own,
-        f"{since}: the body is heavier by {{value}} than before, and its first moment of mass is another one: "
+        f"{since}: the body is heavier by {{value}} than before, and its first moment of mass is other, "
         "by {told[first_moment_x]}, {told[first_moment_y]} and {told[first_moment_z]} along x, y and z. "
         "A load was put on, taken off, or has moved.",
         "Fasten what lies on it, and record everything with the same load.",

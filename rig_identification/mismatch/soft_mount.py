@@ -1,4 +1,7 @@
-"""An IMU on a soft mount: foam, rubber, a long bracket. It resonates, and shows motion larger than it is."""
+"""An IMU that answers with a resonance, and shows motion larger than it is.
+
+It stands on foam, rubber or a long bracket; or its own seismic mass or filter rings (estimate/mounting.py).
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from rig_identification.mismatch.candidate import Candidate, Told
 
 #: Plausible 1/w^2 (s^2) of a mount, of 6 Hz, and its damping ratio, of rubber.
 SOFTNESS, DAMPING, DAMPING_RANGE = (2.0 * np.pi * 6.0) ** -2, 0.08, 0.05
+#: s by which it is late beside that: 2 z/w where the damper does not stand on the body.
+DELAY = 2.0 * DAMPING * SOFTNESS**0.5
 #: Readings in words, by quantity.
 _SHOWN = {"specific_force": "acceleration", "angular_rate": "rate"}
 
@@ -24,30 +29,32 @@ def soft_mounts(parameters: ParameterSet, channels: set[str]) -> list[Candidate]
 
 
 def _mount(parameters: ParameterSet, quantities: tuple[str, ...]) -> Candidate:
-    soft, damped = [], []
+    soft, damped, late = [], [], []
     for quantity in quantities:
         entry, stem = parameters.places.mount(quantity), f"imu.mount.{quantity}"
         soft.append(Parameter(f"{stem}.softness", "s^2", 0.0, SOFTNESS, "device", entry, bounded=False))
         damped.append(
             Parameter(f"{stem}.damping", "1", DAMPING, DAMPING_RANGE, "device", entry + 1, bounded=False)
         )
+        late.append(Parameter(f"{stem}.delay", "s", 0.0, DELAY, "device", entry + 2, bounded=False))
 
     def told(found: Estimates) -> Told:
         out: Told = {}
-        for quantity, k, z in zip(quantities, soft, damped, strict=True):
+        for quantity, k, z, delay in zip(quantities, soft, damped, late, strict=True):
             word = _SHOWN[quantity]
             own = found.following(lambda k: float(1.0 / (2.0 * np.pi * np.sqrt(max(k, 1e-12)))), k.name)
             out[f"frequency_{word}"] = (*own, "Hz")
             out[f"damping_ratio_{word}"] = (*found.of(z.name), "1")
+            out[f"delay_{word}"] = (*found.of(delay.name), "s")
         lowest = min((v for name, v in out.items() if name.startswith("frequency")), key=lambda v: v[0])
         return {"frequency": lowest, **out}
 
     parts = " and ".join("accelerometer" if q == "specific_force" else "gyroscope" for q in quantities)
     return Candidate(
         "sensor_resonance",
-        (*soft, *damped),
-        f"The IMU's {parts} shows a resonance of its mount, at {{value}}: motion looks larger than it is.",
-        "Bolt the IMU to the frame without foam or rubber.",
+        (*soft, *damped, *late),
+        f"The IMU's {parts} shows a resonance, at {{value}}: motion looks larger than it is.",
+        "Bolt the IMU to the frame without foam or rubber, and look at its filter's settings.",
         {"channel": "imu", "axis": None},
         positive=len(quantities),
         tell=told,

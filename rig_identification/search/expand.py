@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.identify import ORDINARY
 from rig_identification.estimate.solve import Evaluation, Point, Problem, excess
 from rig_identification.estimate.stretching import STIFFNESS
@@ -212,14 +211,16 @@ def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: 
     """First fits of what gives way, of which first order says nothing where it rings.
 
     Without a wrench in the model it is scanned by its amount, where the residuals as a whole show something
-    and nothing that was fitted takes the larger part away. With a wrench what rings is told by its forces.
-    But cables that stretch move the body where no force could, and are begun at a few stiffnesses where the
-    wrench does not account for what is measured.
+    and nothing that was fitted takes the larger part away. With a wrench a ceiling that rings is told by its
+    forces. But cables that stretch let the body turn about axes that no force could turn it about, and share
+    its weight among them otherwise: first order about a rig that does not give way promises nothing of it
+    (0.8 nats of 17,000 on four cables that a car of 9 t stretches by 0.07 mm). So they are begun at a few
+    stiffnesses, whatever the wrench accounts for.
     """
     rung = standing.rung
     before = rung.evaluation
     if not rung.alone:
-        return _stretching(standing, budget, say) if misfit(before) > NEAR_SQUARE else []
+        return _stretching(standing, budget, say)
     taken = any(excess(child.rung.evaluation) < CHIEF * excess(before) for child in first)
     if taken or not shows(before) or budget.spent():
         return []
