@@ -40,7 +40,11 @@ def _mount(parameters: ParameterSet, quantities: tuple[str, ...]) -> Candidate:
 
     def told(found: Estimates) -> Told:
         out: Told = {}
+        # A part whose softness may be none has no frequency to tell
+        rings = [k.name for k in soft if found.values[k.name] > 2.0 * found.std(k.name)] or [soft[0].name]
         for quantity, k, z, delay in zip(quantities, soft, damped, late, strict=True):
+            if k.name not in rings:
+                continue
             word = _SHOWN[quantity]
             own = found.following(lambda k: float(1.0 / (2.0 * np.pi * np.sqrt(max(k, 1e-12)))), k.name)
             out[f"frequency_{word}"] = (*own, "Hz")

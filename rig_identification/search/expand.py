@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig_identification.estimate.identify import ORDINARY
-from rig_identification.estimate.solve import Evaluation, Point, Problem, excess
+from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate, excess
 from rig_identification.estimate.stretching import STIFFNESS
 from rig_identification.mismatch.amounts import supports
 from rig_identification.mismatch.budget import Budget
@@ -34,6 +34,7 @@ from rig_identification.mismatch.trial import (
 from rig_identification.model.motion import State
 from rig_identification.search.ladder import REACHED, STAYING, Rung, fitted_at, walked_down
 from rig_identification.search.laws import promised_laws
+from rig_identification.search.levels import ALONE
 from rig_identification.search.path import beside
 
 #: Is told what is being fitted.
@@ -230,16 +231,32 @@ def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: 
 
 
 def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
-    """The best first fit of cables that stretch, over the stiffnesses that wire and rope have."""
+    """The best first fit of cables that stretch, over the stiffnesses that wire and rope have.
+
+    Wire first, and without a wrench: the geometry of a rig that was taken as rigid is bent to what the
+    stretch does to the cables' shares, and a wrench that accounts for the rest holds it there.
+    """
     rung = standing.rung
     rig, model = rung.problem.bench.rig, rung.problem.bench.parameters.model
     if gives_way(model):
         return []
     mass = mass_of(rung.problem, rung.evaluation)
     candidate = cable_elasticity(rig, model, mass)
-    starts = [Promise(candidate, 0.0, {STIFFNESS: amount}) for amount in stiffnesses(rig, mass)]
-    found = [begun_with(standing, start, budget, say) for start in starts if not budget.spent()]
-    return sorted((f for f in found if f is not None), key=lambda f: -f.rung.within_reach)[:1]
+    starts = [Promise(candidate, 0.0, {STIFFNESS: amount}) for amount in reversed(stiffnesses(rig, mass))]
+    rigid = evaluate(rung.model, replace(rung.evaluation.point, latents=()))
+    alone = None if rigid is None else replace(standing, rung=Rung(rung.model, rigid, ALONE))
+    found: list[Standing] = []
+    for start in starts:
+        for parent in (alone, standing):
+            if parent is None or budget.spent():
+                continue
+            child = begun_with(parent, start, budget, say)
+            if child is None:
+                continue
+            found.append(child)
+            if child.rung.alone and child.evidence > standing.evidence:
+                return [child]
+    return sorted(found, key=lambda f: -f.rung.within_reach)[:1]
 
 
 def shows(evaluation: Evaluation) -> bool:

@@ -52,7 +52,7 @@ def unexplained(ideal: Ideal, outcome: Outcome, budget: Budget, notify: Notify) 
         alternatives = tuple(rival(likeliest.trial(c), 0.0) for c in likeliest.found)
         named = ", ".join(called(c.effect, c.where) for c in likeliest.found)
         explanation += f" {named} would take away a part of it, which does not convince."
-    device = None if budget.spent() else liar_of(outcome.first.rung, budget)
+    device = None if budget.late() else liar_of(outcome.first.rung, budget)
     if device in (None, DRIVE):
         # What knocks at the body moves all witnesses: where all but one device agree, nothing does
         for others, base in _bases(ideal, outcome.partly, partly):

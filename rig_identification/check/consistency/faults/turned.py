@@ -56,12 +56,15 @@ class Found:
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """The IMU turned by whatever the motion says, where it is described to sit, and elsewhere as well."""
+    """The IMU turned by whatever the motion says, in the described place or any, or in another place alone."""
     rig = evidence.session.rig
     if rig.imu is None or evidence.bound(frozenset(["imu"])) <= 0.0:
         return
     for found, moved in zip(_sought(evidence, rig, rig.imu), (False, True), strict=False):
         yield of_mount(rig, rig.imu, found, moved=moved)
+    aside = _aside(evidence, rig, rig.imu)
+    if aside is not None:
+        yield of_place(rig.imu, aside)
 
 
 def of_mount(rig: Rig, described: Mount, found: Found, *, moved: bool) -> Hypothesis:
@@ -104,6 +107,33 @@ def of_mount(rig: Rig, described: Mount, found: Found, *, moved: bool) -> Hypoth
     )  # fmt: skip
 
 
+def of_place(described: Mount, found: Found) -> Hypothesis:
+    """That the IMU sits elsewhere, its axes as described."""
+    away = found.mount.position - described.position
+
+    def describe(rest: RestFit | None) -> SetupFault:
+        told = ", ".join(with_interval(float(v), found.place_std, "m") for v in away)
+        return fault(
+            "imu_position",
+            {"channel": "imu"},
+            {f"error_{a}": (float(v), found.place_std, "m") for a, v in zip("xyz", away, strict=True)},
+            "The IMU does not sit where the description says: by the body's motion it is off by "
+            f"{told} along x, y and z.",
+            "Measure where the IMU sits, and correct its position in the rig description. Until then the "
+            "position is estimated from the motion.",
+            f"imu:\n  position: [{', '.join(f'{v:.6g}' for v in found.mount.position)}]",
+        )
+
+    def measured(one: Rig) -> Rig:
+        wider = max(found.place_std, one.tolerance["imu_position"])
+        return replace(one, imu=found.mount, tolerance={**one.tolerance, "imu_position": wider})
+
+    return Hypothesis(
+        Change(rig=lambda one: replace(one, imu=found.mount)), describe, frozenset(["imu"]), variants=2,
+        free=3, fresh=True, fitted=lambda rest: Change(rig=measured),
+    )  # fmt: skip
+
+
 def _copied_from(rig: Rig, described: Mount) -> str | None:
     """The device whose described orientation the IMU's is; None where it is the IMU's own.
 
@@ -138,7 +168,7 @@ def _sought(evidence: Evidence, rig: Rig, described: Mount) -> tuple[Found, ...]
     if np.count_nonzero(known) < FEWEST:
         return ()
     read, alone = run.values["imu"][known], _along(rig, account.motions[0].trajectory, known)
-    size = max(float(np.ptp([c.body_point for c in rig.cables], axis=0).max()), LEAST)
+    size = _size_of(rig)
     out: tuple[Found, ...] = ()
     for fit in range(FITS):
         if account.rest is None or not account.motions:
@@ -157,6 +187,42 @@ def _sought(evidence: Evidence, rig: Rig, described: Mount) -> tuple[Found, ...]
             moved = out[1].place_std < ORDINARY * size
             account = evidence.judged(of_mount(rig, described, out[moved], moved=moved))
     return out
+
+
+def _aside(evidence: Evidence, rig: Rig, described: Mount) -> Found | None:
+    """The place at which an IMU with the described axes agrees best with the motion.
+
+    The other devices tell the motion first; with the IMU in that place all tell it better. None where the
+    motion leaves the described place open.
+    """
+    runs, account = evidence.session.runs, evidence.without(frozenset(["imu"]))
+    if not runs or not account.motions:
+        return None
+    values = runs[0].values.get("imu", np.full((1, 6), np.nan))
+    known = np.asarray(np.isfinite(values).all(axis=1))
+    if np.count_nonzero(known) < FEWEST:
+        return None
+    read, R = values[known], rotation(described)
+    alone = _along(rig, account.motions[0].trajectory, known)
+    size, found = _size_of(rig), None
+    for _ in range(FITS):
+        if account.rest is None or not account.motions:
+            break
+        at = _along(rig, account.motions[0].trajectory, known)
+        if not (np.isfinite(at.proper).all() and np.isfinite(at.lever).all()):
+            return None
+        place = _place(at.lever, read[:, 3:] @ R.T - at.proper, described.position, size)
+        mount = replace(described, position=place)
+        found = Found(mount, *_doubt(mount, alone, read))
+        if float(np.linalg.norm(place - described.position)) < max(ORDINARY * size, CLEAR * found.place_std):
+            return None
+        account = evidence.judged(of_place(described, found))
+    return found
+
+
+def _size_of(rig: Rig) -> float:
+    """m, the hinges' largest distance along an axis: a body is at least so large."""
+    return max(float(np.ptp([c.body_point for c in rig.cables], axis=0).max()), LEAST)
 
 
 def _contradicted(described: Mount, found: Found) -> bool:
