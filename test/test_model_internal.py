@@ -50,12 +50,13 @@ def on_springs(mass: float, point: Array, frequencies: tuple[float, float, float
     return blocks
 
 
-def ceiling(compliance: float, axis: Array, frequency: float, damping: float = 0.0) -> Array:
-    """Block of a ceiling that yields along ``axis``."""
+def ceiling(compliance: float, axis: Array, frequency: float, damping: float = 0.0, hinge: int = 0) -> Array:
+    """Block of a ceiling that yields along ``axis``. hinge: 0: of all cables; i + 1: of cable i alone."""
     block = np.zeros((1, layout.INTERNAL_SIZE))
     block[0, layout.KIND], block[0, layout.COMPLIANCE] = layout.CEILING, compliance
     block[0, layout.AXIS : layout.AXIS + 3] = axis
     block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = frequency, damping
+    block[0, layout.HINGE] = hinge
     return block
 
 
@@ -150,8 +151,9 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
     model = model.with_internal(pendulum(30.0, np.array([0.1, 0.2, -0.4]), 1.4, 0.02))
     model = model.with_internal(rider(0.0, np.array([0.1, -0.3, -0.2]), AXES[2:], 2.0, 0.02))
     model = model.with_internal(ceiling(1e-6, AXES[2], 6.0, 0.03))
+    model = model.with_internal(ceiling(2e-6, AXES[2], 8.0, 0.2, hinge=2))
     model = model.with_internal(on_springs(40.0, np.array([-0.2, 0.3, -0.3]), (3.1, 4.2, 2.5)))
-    assert model.internal == 9
+    assert model.internal == 10
     start, drive = moving(sample, model, 5), driven(41, 0.01, 5)
     body = [
         layout.INERTIAL,
@@ -163,9 +165,10 @@ def test_every_number_of_internal_coordinates(elastic: bool) -> None:
     steps = {layout.MASS: 0.1, layout.POINT: 1e-3, layout.POINT + 2: 1e-3}
     steps |= {layout.FREQUENCY: 1e-4, layout.DAMPING_RATIO: 1e-3}
     entries = {place.internal_block(3, k) + e: h for k in (0, 2, 4) for e, h in steps.items()}
-    entries[place.internal_block(3, 7) + layout.FREQUENCY] = 1e-4
+    entries[place.internal_block(3, 8) + layout.FREQUENCY] = 1e-4
     entries[place.internal_block(3, 5) + layout.COMPLIANCE] = 1e-10
     entries[place.internal_block(3, 5) + layout.FREQUENCY] = 1e-3
+    entries[place.internal_block(3, 6) + layout.COMPLIANCE] = 1e-10
     exact = simulate(model, start, drive, directions=np.array(list(entries)), substeps=20)
     assert exact.J is not None
     where = slice(layout.OUT_RATE, None)

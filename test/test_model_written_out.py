@@ -80,6 +80,7 @@ def test_what_is_written_out_is_what_the_complex_step_gives(mode: int, yielding:
     model = model.with_physics(physics)
     if yielding:
         model = model.with_internal(ceiling(2e-6, np.array([[0.6, 0.0, 0.8]]), 4.0, 0.05))
+        model = model.with_internal(ceiling(3e-6, np.array([[0.0, 0.6, 0.8]]), 5.0, 0.1, hinge=1))
     modes = np.full(model.cables, layout.RIGID)
     modes[1] = mode
     held_to_the_complex_step(model, sample, modes)

@@ -24,6 +24,7 @@ from rig_identification.estimate.solve import (
     Point,
     Problem,
     evaluate,
+    excess,
     shortened,
     solve,
 )
@@ -46,6 +47,8 @@ NEAR_SQUARE = 1.3
 #: was hopeless: they only say how far off it is.
 STEPS, HOPELESS_STEPS = 20, 5
 HOPELESS_PATIENCE = 1.0
+#: Standard deviations of a sum of squares beyond which something is left of the residuals as a whole.
+SEEN = 4.0
 
 
 class OutOfReach(FloatingPointError):
@@ -160,3 +163,9 @@ def fit_start_growing(bench: Bench, run: Run, theta: Array, start: State) -> tup
             return None
         start = result[1]
     return result
+
+
+def shows(evaluation: Evaluation) -> bool:
+    """Whether the residuals as a whole show that something is left."""
+    size = sum(run.residual.size for run in evaluation.runs)
+    return bool(excess(evaluation) >= SEEN * np.sqrt(0.5 * size))

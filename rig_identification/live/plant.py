@@ -110,10 +110,10 @@ def as_taut_as(model: RigModel, state: State) -> RigModel:
     """The rig with those cables slack that span less than their length: they stay so from block to block."""
     modes = model.modes.copy()
     physics, x = model.physics, state.vector(model.states)
-    shift = np.array(ceiling_shift(physics, model.cables, x))[:3]
     for i in np.flatnonzero(model.can_slacken):
         cable = physics[layout.cable_offset(int(i)) :]
         hinge = state.position + state.R_world_body @ cable[layout.BODY_POINT : layout.BODY_POINT + 3]
+        shift = np.array(ceiling_shift(physics, model.cables, x, int(i)))[:3]
         above = cable[layout.CEILING_POINT : layout.CEILING_POINT + 3] + shift
         if np.linalg.norm(above - hinge) < cable[layout.LENGTH] - LOOSE:
             modes[i] = layout.SLACK

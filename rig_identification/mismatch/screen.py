@@ -48,6 +48,7 @@ from rig_identification.mismatch.supports import (
     gives_way,
     largest_compliance,
     stiffnesses,
+    taut_cables,
     yielding_like,
 )
 from rig_identification.mismatch.tethers import placed_tethers
@@ -122,12 +123,13 @@ def screen(
     rig, model = problem.bench.rig, problem.bench.parameters.model
     axes = () if gives_way(model) else range(3)
     probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in axes]
-    opened = opened_with(problem, evaluation, [*candidates, *probes])
+    taut = taut_cables(rig, model, mass)
+    opened = opened_with(problem, evaluation, [*candidates, *probes, *taut])
     if opened is None:
         return []
     wide, beyond, boxed = opened
     full = beyond.full
-    out = [promise_of(wide, beyond, boxed, c) for c in candidates]
+    out = [promise_of(wide, beyond, boxed, c) for c in (*candidates, *taut)]
     for probe in (promise_of(wide, beyond, boxed, c) for c in probes):
         out += _supports(problem, mass, probe)
     placed = [

@@ -1,8 +1,13 @@
 """What holds the rig up gives way: cables that stretch, a ceiling that yields.
 
-Both are looked for by a ceiling without compliance that is there in the linearised model only:
-the derivative in its compliance at zero is exact, and n cables of stiffness EA/L side by side yield
-under the weight like a ceiling of compliance L/(n EA).
+Both are looked for by what does not yield yet and is there in the linearised model only: the derivative in
+its compliance at zero is exact. A ceiling moves all upper hinges. Of cables that stretch each moves its own,
+along itself, by L/EA of its tension: that shares the load among them otherwise, and lets the body turn about
+axes that no ceiling turns it about.
+
+Steel cables let a body bounce at tens of hertz, far above what shakes it. What they stretch by then follows
+their tension at once, and the bounce itself needs not be followed: each hinge follows as a ceiling of its own
+does that is held at TAUT_FREQUENCY, which costs no shorter step. Softer ones are elastic in the model.
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.estimates import Estimates
+from rig_identification.estimate.growing import shows
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem
@@ -27,6 +33,7 @@ from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import RigModel, State, on_cables
+from rig_identification.model.substeps import hanging
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -36,6 +43,11 @@ CEILING_FREQUENCY = 10.0
 #: Damping ratio of a probe: it starts unloaded, and what that costs is over after a twentieth of a second.
 PROBE_DAMPING = 1.0
 
+#: Frequency (Hz) at which a taut cable's stretch follows its tension, and the damping ratio: at 2 Hz by 2 %
+#: too much and 6 ms late. It is what the step of every fit resolves.
+TAUT_FREQUENCY, TAUT_DAMPING = 15.0, 0.3
+#: What taut cables have of 1/EA.
+TAUT = "cable.compliance"
 #: Parts of the usual stiffness at which cables that stretch are begun: webbing, rope, wire.
 STRETCHES = (0.03, 0.3, 3.0)
 
@@ -43,6 +55,14 @@ STRETCHES = (0.03, 0.3, 3.0)
 def gives_way(model: RigModel) -> bool:
     """Whether something in the model swings or stretches already."""
     return model.internal > 0 or not np.all(model.modes == layout.RIGID)
+
+
+def stretches(model: RigModel) -> bool:
+    """Whether cables stretch in the model, or a ceiling yields, which first order hardly tells from that."""
+    kinds = [
+        model.physics[place.internal_block(model.cables, k) + layout.KIND] for k in range(model.internal)
+    ]
+    return layout.CEILING in kinds or not np.all(model.modes == layout.RIGID)
 
 
 def largest_compliance(rig: Rig, mass: float) -> float:
@@ -161,6 +181,59 @@ def cable_elasticity(rig: Rig, model: RigModel, mass: float) -> Candidate:
         build=build,
         settle=stretched,
     )
+
+
+def taut_cables(rig: Rig, model: RigModel, mass: float) -> list[Candidate]:
+    """Cables that stretch, all alike and so little that their stretch follows their tension; none twice."""
+    if stretches(model):
+        return []
+    along = hanging(
+        *(np.array([getattr(c, a) for c in rig.cables]) for a in ("ceiling_point", "body_point", "length"))
+    )
+
+    def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        first, entries = model.internal, []
+        for i, cable in enumerate(rig.cables):
+            block = np.zeros((1, layout.INTERNAL_SIZE))
+            block[0, layout.KIND], block[0, layout.HINGE] = layout.CEILING, i + 1
+            block[0, layout.AXIS : layout.AXIS + 3] = along[i]
+            block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = TAUT_FREQUENCY, TAUT_DAMPING
+            entries.append((place.internal_block(model.cables, first + i) + layout.COMPLIANCE, cable.length))
+            model = model.with_internal(block)
+        own = Parameter(
+            TAUT,
+            "1/N",
+            0.0,
+            1.0 / usual_stiffness(rig, mass),
+            "physics",
+            -1,
+            bounded=False,
+            shifts=tuple(entries),
+        )
+        return model, (own,)
+
+    def told(found: Estimates) -> Told:
+        return {"axial_stiffness": (*found.following(lambda e: 1.0 / max(e, 1e-15), TAUT), "N")}
+
+    def elastic(problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:
+        here = problem.bench.parameters.named(evaluation.point.theta)[TAUT]
+        if here <= 0.0 or (problem.discrepancy is None and not shows(evaluation)):
+            return []
+        return [(cable_elasticity(rig, model, mass), {STIFFNESS: 1.0 / here})]
+
+    return [
+        Candidate(
+            "cable_elasticity",
+            build(model)[1],
+            "The cables stretch: their axial stiffness EA is {value}.",
+            "Keep the stretch in the model; no steel rope is stiff enough to leave it out.",
+            {"channel": None, "axis": None},
+            positive=1,
+            tell=told,
+            build=build,
+            closer=elastic,
+        )
+    ]
 
 
 def stretched(problem: Problem, point: Point, evaluation: Evaluation) -> Point:

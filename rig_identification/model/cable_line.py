@@ -37,7 +37,7 @@ def cable_line(physics, cables, i, x, R):  # type: ignore[no-untyped-def]
     """Of cable i: u, the line from the datum to the ceiling's hinge, R^T v, w x b, s (3 each), and l."""
     o = CABLES + CABLE_SIZE * i
     # A yielding ceiling moves the upper hinges
-    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, cables, x)
+    s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, cables, x, i)
     vx, vy, vz = in_body(R, x[VELOCITY] - c0, x[VELOCITY + 1] - c1, x[VELOCITY + 2] - c2)
     bx, by, bz = physics[o + BODY_POINT], physics[o + BODY_POINT + 1], physics[o + BODY_POINT + 2]
     d0 = physics[o + CEILING_POINT] + s0 - x[0]

@@ -69,10 +69,10 @@ def cable_length_and_rate(physics, offset, shift, x, R, gradient):  # type: igno
 def rigid_jacobian(physics, modes, x, R, G, gap, rate):  # type: ignore[no-untyped-def]
     """Fill G (n, 6), gap (n,) = l - L and rate (n,) of the rigid cables; returns their number."""
     count = 0
-    shift = ceiling_shift(physics, modes.shape[0], x)
     for i in range(modes.shape[0]):
         if modes[i] == RIGID:
             offset = CABLES + CABLE_SIZE * i
+            shift = ceiling_shift(physics, modes.shape[0], x, i)
             length, speed = cable_length_and_rate(physics, offset, shift, x, R, G[count])
             gap[count] = length - physics[offset + LENGTH]
             rate[count] = speed
@@ -177,15 +177,16 @@ def _length_changes(physics, n, i, x, R, longer, faster):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def _add_ceiling_changes(physics, n, offset, x, R, columns, defect, rate_defect):  # type: ignore[no-untyped-def]
-    """Add to (m,) each what the internal coordinates of ``columns`` do to the cable at ``offset``."""
+def _add_ceiling_changes(physics, n, i, x, R, columns, defect, rate_defect):  # type: ignore[no-untyped-def]
+    """Add to (m,) each what the internal coordinates of ``columns`` do to cable i."""
+    offset = CABLES + CABLE_SIZE * i
     xc = x.astype(np.complex128)
     pc = physics.astype(np.complex128)
     Rc = R.astype(np.complex128)
     gc = np.empty(6, dtype=np.complex128)
     for d in range(BODY_STATE, x.shape[0]):
         xc[d] = complex(x[d], STEP)
-        length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc), xc, Rc, gc)
+        length, speed = cable_length_and_rate(pc, offset, ceiling_shift(pc, n, xc, i), xc, Rc, gc)
         for c in range(columns.shape[1]):
             defect[c] += length.imag / STEP * columns[d, c]
             rate_defect[c] += speed.imag / STEP * columns[d, c]
@@ -229,7 +230,7 @@ def project_columns(physics, modes, x, reference, directions, first_direction, c
             elif number == LENGTH:
                 defect[row, first_direction + k] = -1.0
         if x.shape[0] > BODY_STATE:
-            _add_ceiling_changes(physics, n, offset, x, reference, columns, defect[row], rate_defect[row])
+            _add_ceiling_changes(physics, n, i, x, reference, columns, defect[row], rate_defect[row])
         row += 1
     _subtract_projection(G, plus, count, defect, columns, 0)
     for row in range(count):

@@ -155,7 +155,7 @@ def add_cable(physics, i, modes, x, R, K, r):  # type: ignore[no-untyped-def]
     v0, v1, v2 = x[VELOCITY], x[VELOCITY + 1], x[VELOCITY + 2]
     if size > 6 + n:
         # Cables see the body from their upper hinges, which a yielding ceiling moves
-        s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x)
+        s0, s1, s2, c0, c1, c2 = ceiling_shift(physics, n, x, i)
         p0, p1, p2, v0, v1, v2 = p0 - s0, p1 - s1, p2 - s2, v0 - c0, v1 - c1, v2 - c2
     vx = R[0, 0] * v0 + R[1, 0] * v1 + R[2, 0] * v2
     vy = R[0, 1] * v0 + R[1, 1] * v1 + R[2, 1] * v2

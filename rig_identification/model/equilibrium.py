@@ -33,7 +33,6 @@ def rest_defect(physics, modes, mount, x, R, tension, K, r, gradient, out):  # t
     """out (6 + n + s,): unbalanced wrench, each cable's length less what its tension stretches it to, and
     what accelerates each internal coordinate."""
     n = modes.shape[0]
-    shift = ceiling_shift(physics, n, x)
     force = np.zeros(3, dtype=x.dtype)
     wrench = np.zeros(6, dtype=x.dtype)
     assemble(physics, modes, mount, x, R, force, wrench, K, r)
@@ -43,6 +42,7 @@ def rest_defect(physics, modes, mount, x, R, tension, K, r, gradient, out):  # t
             out[i] -= K[i, 6 + j] * tension[j]
     for j in range(n):
         offset = layout.CABLES + layout.CABLE_SIZE * j
+        shift = ceiling_shift(physics, n, x, j)
         length, _ = cable_length_and_rate(physics, offset, shift, x, R, gradient)
         if modes[j] == layout.RIGID:
             out[6 + j] = length - physics[offset + layout.LENGTH]

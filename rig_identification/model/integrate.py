@@ -348,7 +348,7 @@ def _switch_cables(physics, modes, x, reference, z, can_slacken):  # type: ignor
         elif modes[i] == SLACK:
             o = CABLES + CABLE_SIZE * i
             gradient = np.empty(6)
-            shift = ceiling_shift(physics, modes.shape[0], x)
+            shift = ceiling_shift(physics, modes.shape[0], x, i)
             length, rate = cable_length_and_rate(physics, o, shift, x, reference, gradient)
             if length > physics[o + LENGTH] and rate > 0.0:
                 modes[i] = RIGID

@@ -31,6 +31,7 @@ LEADER = 1  # constant: number of the coordinate that holds what those of one ma
 AXIS = 2  # 3: direction, in body (rider) or world (ceiling)
 MASS = 5  # kg (rider)
 POINT = 6  # 3: m, body: where a rider rests
+HINGE = 6  # constant (ceiling): 0 moves all upper hinges, i + 1 that of cable i alone
 FREQUENCY = 9  # Hz
 DAMPING_RATIO = 10
 COMPLIANCE = 11  # m/N (ceiling)

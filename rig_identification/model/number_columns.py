@@ -18,6 +18,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.cable_line import cable_line, cross, hinge_change, in_body, line_change
+from rig_identification.model.effects.internal import moves_hinge
 from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
@@ -27,7 +28,6 @@ from rig_identification.model.layout import (
     BODY_STATE,
     CABLE_SIZE,
     CABLES,
-    CEILING,
     COMPLIANCE,
     ELASTIC,
     EXCITER_GAIN,
@@ -36,7 +36,6 @@ from rig_identification.model.layout import (
     GRAVITY,
     INERTIAL,
     INTERNAL_SIZE,
-    KIND,
     LENGTH,
     RATE,
     RIGID,
@@ -196,7 +195,7 @@ def cable_number_columns(physics, modes, i, x, R, z, change):  # type: ignore[no
         # How far the cable's pull acts along a ceiling's axis
         for j in range(internal):
             own = block + INTERNAL_SIZE * j
-            if physics[own + KIND] != CEILING:
+            if not moves_hinge(physics, own, i):
                 continue
             rx, ry, rz = in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
             turned = rx * tx + ry * ty + rz * tz

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 
 from rig_identification.model.cable_line import cable_line, cross, in_body, line_change
+from rig_identification.model.effects.internal import moves_hinge
 from rig_identification.model.effects.place import EFFECTS_SIZE
 from rig_identification.model.layout import (
     AXIAL_DAMPING,
@@ -29,13 +30,11 @@ from rig_identification.model.layout import (
     BODY_STATE,
     CABLE_SIZE,
     CABLES,
-    CEILING,
     COMPLIANCE,
     ELASTIC,
     GRAVITY,
     INERTIAL,
     INTERNAL_SIZE,
-    KIND,
     LENGTH,
     RATE,
     RIGID,
@@ -138,7 +137,7 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
             px, py, pz = R[k, 0], R[k, 1], R[k, 2]
         elif column >= BODY_STATE:
             own = block + INTERNAL_SIZE * ((column - BODY_STATE) % internal)
-            if physics[own + KIND] != CEILING:
+            if not moves_hinge(physics, own, i):
                 continue
             rx, ry, rz = in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
             if column < BODY_STATE + internal:
@@ -179,7 +178,7 @@ def _add_cable_columns(physics, modes, i, x, R, tau, z, change):  # type: ignore
         # How far the cable's pull acts along a ceiling's axis
         for j in range(internal):
             own = block + INTERNAL_SIZE * j
-            if physics[own + KIND] != CEILING:
+            if not moves_hinge(physics, own, i):
                 continue
             rx, ry, rz = in_body(R, physics[own + AXIS], physics[own + AXIS + 1], physics[own + AXIS + 2])
             turned = rx * tx + ry * ty + rz * tz

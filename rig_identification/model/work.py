@@ -17,8 +17,8 @@ from contextvars import ContextVar
 UNIT = 1_000_000
 #: Units of work after which no further effect is begun, and no hypothesis fitted any further: under three
 #: minutes of two cores. Measured on three whole answers (two runs of 32 s each; hinges that damp, a cell's
-#: gain, a hose) are 83, 50 and 82 units, 0.69, 0.94 and 0.71 a second of a core that others used as well, which
-#: makes it a tenth slower. The search keeps one and a half of two cores busy: 1.25 units a second.
+#: gain, a hose) are 83, 50 and 82 units, 0.69, 0.94 and 0.71 a second of a core that others used as well,
+#: which makes it a tenth slower. The search keeps one and a half of two cores busy: 1.25 units a second.
 WORK = 200.0
 #: Share of an answer's work that whole runs with what was found, and a stand-in for what was not, may take
 #: beyond: half a minute. What has not settled by then is not told.

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.growing import shows
 from rig_identification.estimate.identify import Ideal
 from rig_identification.estimate.solve import solve
 from rig_identification.estimate.verdict import hear
@@ -24,7 +25,7 @@ from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.pulse import all_runs
 from rig_identification.mismatch.whole_runs import Named, whole_runs
-from rig_identification.search.expand import Standing, children, shows
+from rig_identification.search.expand import Standing, children
 from rig_identification.search.ladder import Rung
 from rig_identification.search.laws import in_words, sparse
 from rig_identification.search.levels import ALONE

@@ -19,9 +19,10 @@ springs, so that it rises along n = d_1 x d_2 by l - s, s = (l^2 - q^2)^1/2, as 
 t_k stands for d_k above (what damps it works along its path), g for g - g_rest, nothing for the
 spring, and the acceleration of rho gains n (q'.q'/s + (q.q')^2/s^3).
 
-A ceiling moves all upper hinges by d q. With compliance kappa = 1/k and f = (k/M)^(1/2)/2 pi
+A ceiling moves all upper hinges, or one alone, by d q. With compliance kappa = 1/k and f = (k/M)^(1/2)/2 pi
     q''/(2 pi f)^2 + 2 zeta q'/(2 pi f) + q = -kappa sum T_i u_i . d
-which is a ceiling that does not feel the cables where kappa is zero.
+which is a ceiling that does not feel the cables where kappa is zero. The sum is over the cables whose hinges
+it moves.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from rig_identification.model.layout import (
     DAMPING_RATIO,
     FREQUENCY,
     GRAVITY,
+    HINGE,
     INTERNAL_SIZE,
     KIND,
     LEADER,
@@ -59,14 +61,21 @@ STOP_FREQUENCY = 20.0
 
 
 @njit(cache=True)
-def ceiling_shift(physics, cables, x):  # type: ignore[no-untyped-def]
-    """Displacement and velocity (world) of the upper hinges, six numbers."""
+def moves_hinge(physics, o, cable):  # type: ignore[no-untyped-def]
+    """Whether the internal coordinate of the block at ``o`` is a ceiling that moves a cable's upper hinge."""
+    hinge = physics[o + HINGE].real
+    return physics[o + KIND].real == CEILING and (hinge == 0.0 or hinge == cable + 1.0)
+
+
+@njit(cache=True)
+def ceiling_shift(physics, cables, x, cable):  # type: ignore[no-untyped-def]
+    """Displacement and velocity (world) of a cable's upper hinge, six numbers."""
     nothing = 0.0 * x[0]
     s0, s1, s2, v0, v1, v2 = nothing, nothing, nothing, nothing, nothing, nothing
     count = (x.shape[0] - BODY_STATE) // 2
     for j in range(count):
         o = CABLES + CABLE_SIZE * cables + EFFECTS_SIZE + INTERNAL_SIZE * j
-        if physics[o + KIND].real == CEILING:
+        if moves_hinge(physics, o, cable):
             q, speed = x[BODY_STATE + j], x[BODY_STATE + count + j]
             s0 += physics[o + AXIS] * q
             s1 += physics[o + AXIS + 1] * q
@@ -86,7 +95,7 @@ def add_ceiling(physics, cables, x, R, cable, ux, uy, uz, rigid, K):  # type: ig
     w2 = R[2, 0] * ux + R[2, 1] * uy + R[2, 2] * uz
     for j in range(count):
         o = CABLES + CABLE_SIZE * cables + EFFECTS_SIZE + INTERNAL_SIZE * j
-        if physics[o + KIND].real == CEILING:
+        if moves_hinge(physics, o, cable):
             along = physics[o + AXIS] * w0 + physics[o + AXIS + 1] * w1 + physics[o + AXIS + 2] * w2
             row = 6 + cables + j
             K[row, 6 + cable] += physics[o + COMPLIANCE] * along

@@ -56,7 +56,7 @@ class Found:
 
 
 def hypotheses(evidence: Evidence) -> Iterator[Hypothesis]:
-    """The IMU turned by whatever the motion says, in the described place or any, or in another place alone."""
+    """The IMU turned by whatever the motion says, in the described place or any; in another place alone."""
     rig = evidence.session.rig
     if rig.imu is None or evidence.bound(frozenset(["imu"])) <= 0.0:
         return
