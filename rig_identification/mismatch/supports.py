@@ -23,6 +23,7 @@ from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.estimate.stretching import (
+    BOUNCE,
     DAMPING,
     STIFFNESS,
     TIME_CONSTANT,
@@ -46,6 +47,9 @@ PROBE_DAMPING = 1.0
 #: Frequency (Hz) at which a taut cable's stretch follows its tension, and the damping ratio: at 2 Hz by 2 %
 #: too much and 6 ms late. It is what the step of every fit resolves.
 TAUT_FREQUENCY, TAUT_DAMPING = 15.0, 0.3
+#: Bounce (Hz) of a body above which nothing but a ring tells cables that are elastic in the model from these:
+#: each step is then a tenth of a fit's.
+TAUTEST = 30.0
 #: What taut cables have of 1/EA.
 TAUT = "cable.compliance"
 #: Parts of the usual stiffness at which cables that stretch are begun: webbing, rope, wire.
@@ -217,7 +221,7 @@ def taut_cables(rig: Rig, model: RigModel, mass: float) -> list[Candidate]:
 
     def elastic(problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:
         here = problem.bench.parameters.named(evaluation.point.theta)[TAUT]
-        if here <= 0.0 or (problem.discrepancy is None and not shows(evaluation)):
+        if here * usual_stiffness(rig, mass) < (BOUNCE / TAUTEST) ** 2 or not shows(evaluation):
             return []
         return [(cable_elasticity(rig, model, mass), {STIFFNESS: 1.0 / here})]
 
