@@ -221,7 +221,8 @@ def taut_cables(rig: Rig, model: RigModel, mass: float) -> list[Candidate]:
 
     def elastic(problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:
         here = problem.bench.parameters.named(evaluation.point.theta)[TAUT]
-        if here * usual_stiffness(rig, mass) < (BOUNCE / TAUTEST) ** 2 or not shows(evaluation):
+        left = problem.discrepancy is not None or shows(evaluation)
+        if here * usual_stiffness(rig, mass) < (BOUNCE / TAUTEST) ** 2 or not left:
             return []
         return [(cable_elasticity(rig, model, mass), {STIFFNESS: 1.0 / here})]
 
