@@ -415,6 +415,14 @@ def test_a_word_misspelt_has_its_right_one_said(
     assert f"did you mean {meant}?" in line
 
 
+def test_an_option_before_its_command_is_told_where_it_belongs(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--debug", "check", "."])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "unrecognized arguments: --debug; it belongs after the command" in line
+
+
 def test_a_shell_completes_commands_and_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("shtab", reason="pip install '.[completion]'")
     assert main(["completion", "bash"]) == 0

@@ -75,7 +75,9 @@ def parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     if unknown:
         parser: argparse.ArgumentParser = arguments.parser
         options = [name for action in parser._actions for name in action.option_strings]
-        near = did_you_mean(unknown[0].partition("=")[0], options)
+        word = unknown[0].partition("=")[0]
+        # An option that stands before the command is nobody's
+        near = "; it belongs after the command" if word in options else did_you_mean(word, options)
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{near}")
     return arguments
 

@@ -15,6 +15,8 @@ from rig_identification.result import Identification
 
 #: s of a search before its speed says how long it will take, and the step in which seconds are told.
 MEASURED, STEP = 5.0, 10.0
+#: Share of the work by which the speed is known: what comes before is reading and compiling for the most part.
+KNOWN = 0.02
 #: Elements that are told while a search runs: mass and the three moments.
 SHOWN = ("m", "Jxx", "Jyy", "Jzz")
 
@@ -64,7 +66,7 @@ class Searching:
         """Time left at most, once the speed is known; "" before."""
         done = self._done()
         elapsed = 0.0 if self._begin is None else self._clock() - self._begin
-        if elapsed < MEASURED or done <= 0.0:
+        if elapsed < MEASURED or done < KNOWN * self._limit:
             return ""
         left = max((1.0 + BEYOND) * self._limit - done, 0.0) * elapsed / done
         return f"at most {_time(left)} left"
