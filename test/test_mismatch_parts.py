@@ -122,6 +122,21 @@ def test_what_nothing_explains_is_told_with_its_strength_axis_and_law() -> None:
     assert "A force at the exciter" in driven.statement
 
 
+def test_wind_is_told_at_the_point_where_it_acts() -> None:
+    """A force of any course that turns a little tells its point in all three coordinates."""
+    rng, rig, at = np.random.default_rng(5), thesis_case_14().rig, np.array([0.2, 0.0, 0.5])
+    gusts = np.cumsum(rng.standard_normal((2000, 3)), axis=0) * [0.3, 1.0, 0.2]
+    missing = swinging(gusts, motion())
+    wrench = missing.wrench.copy()
+    wrench[:, 3:] = np.cross(at, wrench[:, :3]) + 0.05 * rng.standard_normal((2000, 3))
+    found = missing_finding(replace(missing, wrench=wrench), rig, None)
+    np.testing.assert_allclose(found.where["position"], at, atol=0.01)  # type: ignore[arg-type]
+    assert "It acts as one force does at (0.2" in found.statement
+    wrench[:, 3:] += 20.0 * np.sin(np.arange(2000) / 150.0)[:, None]
+    couple = missing_finding(replace(missing, wrench=wrench), rig, None)
+    assert "as one force" not in couple.statement
+
+
 def test_a_massless_rider_travels_as_its_equation_says() -> None:
     step, omega = 0.005, 2.0 * np.pi * 0.8
     t = step * np.arange(24000)

@@ -15,7 +15,7 @@ from rig_identification.result import Identification
 
 #: s of a search before its speed says how long it will take, and the step in which seconds are told.
 MEASURED, STEP = 5.0, 10.0
-#: Share of the work by which the speed is known: what comes before is reading and compiling for the most part.
+#: Share of the work by which the speed is known: what comes before is reading and compiling mostly.
 KNOWN = 0.02
 #: Elements that are told while a search runs: mass and the three moments.
 SHOWN = ("m", "Jxx", "Jyy", "Jzz")

@@ -49,6 +49,8 @@ class Push:
 
 #: Share of the peak at which a push begins and ends.
 EDGE = 0.15
+#: Share of the largest eigenvalue below which a force turns too little to tell where along it it acts.
+NARROW, TINY = 1e-3, 1e-30
 
 
 def strongest_push(missing: MissingWrench, middle: Array) -> Push:
@@ -70,6 +72,32 @@ def strongest_push(missing: MissingWrench, middle: Array) -> Push:
     offset = np.linalg.lstsq(rows, right, rcond=0.05)[0]
     spread = float(np.sqrt(np.mean(quiet**2))) if quiet.size else float("nan")
     return Push(float(missing.time[a]), float(missing.time[b]), force[k], spread, middle + offset)
+
+
+@dataclass(frozen=True)
+class LineOfAction:
+    """Where a missing wrench acts as one force."""
+
+    point: Array  # (3,) m, body: nearest the middle of the body
+    share: float  # of the moment about that middle, as a mean square, that a force there has
+
+
+def line_of_action(missing: MissingWrench, middle: Array) -> LineOfAction:
+    """The one point of the body at which the missing force has most of the missing moment over its course.
+
+    Least squares of M - middle x F = offset x F, both less their means. Along a force that never turns the
+    point is left where it is nearest to the middle.
+    """
+    wrench = missing.wrench - np.mean(missing.wrench, axis=0)
+    force, about = wrench[:, :3], wrench[:, 3:] - np.cross(middle, wrench[:, :3])
+    # |offset x F|^2 and the products with M, summed over the course
+    normal = np.sum(force**2) * np.eye(3) - force.T @ force
+    right = np.sum(np.cross(force, about), axis=0)
+    values, vectors = np.linalg.eigh(normal)
+    told = values > NARROW * values[-1]
+    offset = vectors[:, told] @ ((vectors[:, told].T @ right) / values[told])
+    left = about - np.cross(offset, force)
+    return LineOfAction(middle + offset, 1.0 - float(np.sum(left**2) / max(np.sum(about**2), TINY)))
 
 
 def _cross(v: Array) -> Array:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.findings import pushed, written
-from rig_identification.mismatch.latent import MissingWrench, strongest_push
+from rig_identification.mismatch.latent import MissingWrench, line_of_action, strongest_push
 from rig_identification.mismatch.law import law_of
 from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.riders import middle_of
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: Relative uncertainty of a push's peak: it is an average over a tenth of a second.
 SMEARED = 0.02
+#: Share of the missing moment that a force at one point has to have for that point to be told.
+ONE_FORCE = 0.95
 
 
 def push_finding(missing: MissingWrench, rig: Rig) -> Finding:
@@ -52,7 +54,9 @@ def missing_finding(missing: MissingWrench, rig: Rig, device: str | None) -> Fin
             "end": round(float(missing.time[-1]), 3),
         }
     ]
-    where["position"] = [float(v) for v in push.point]
+    line = line_of_action(missing, middle)
+    one = line.share > ONE_FORCE
+    where["position"] = [float(v) for v in (line.point if one else push.point)]
     if device is not None:
         text = f"Everything but {device} agrees: it is wrong in a way that no entry of the catalogue has."
     else:
@@ -62,6 +66,9 @@ def missing_finding(missing: MissingWrench, rig: Rig, device: str | None) -> Fin
             f"(root mean square), mostly along {axis}, and {turning_moment} N m; strongest at "
             f"{0.5 * (push.start + push.end):.1f} s of {missing.recording}."
         )
+        if one:
+            place = ", ".join(f"{v:.3f}" for v in line.point)
+            text += f" It acts as one force does at ({place}) m of the body."
         text += f" Over time {law.words}." if law is not None else " It follows no simple law of the motion."
         if driven:
             text += " A force at the exciter beyond the measured one would account for it as well."
