@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 from test_simulate_identify import seen_by_the_true_body, shaken
 
+from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.mismatch.unknown import missing_finding
+from rig_identification.result import ELEMENTS
 from rig_identification.search import unexplained
 from rig_identification.search.ladder import Rung, fitted_at
 from rig_identification.search.levels import ALONE
-from rig_identification.search.unexplained import WEAKER, WRONG, _partly, strongest_missing
+from rig_identification.search.unexplained import WEAKER, WRONG, _partly, strongest_missing, without_device
+from rig_identification.simulate import simulate_session
 
 
 def partly(
@@ -73,3 +77,28 @@ def test_the_missing_wrench_is_as_strong_as_what_is_left_out_and_acts_where_it_d
     alone = strongest_missing(Rung(problem, rung.evaluation, ALONE))
     assert alone is not None
     assert alone.recording == "run_1"
+
+
+def test_where_everything_but_one_device_agrees_the_others_tell_the_body() -> None:
+    """A motor that hums into a cell: with it heard the body is bent to the hum."""
+    made, truth = simulate_session(shaken(12, 10.0), np.random.default_rng(6))
+    runs = []
+    for run in made.recordings:
+        tension = dict(run.tension)
+        cell = tension["cable_2"]
+        if run.kind == "dynamic":
+            hum = 30.0 * np.sin(2.0 * np.pi * 1.4 * cell.time + np.cos(3.0 * cell.time))[:, None]
+            tension["cable_2"] = replace(cell, values=cell.values + hum)
+        runs.append(replace(run, tension=tension))
+    fitted = fit_session(replace(made, recordings=tuple(runs)))
+    ideal = Ideal(fitted, *judged(fitted))
+    assert ideal.mismatch.verdict == "unexplained"
+    others = without_device(ideal, "cable_2", lambda stage, done: None)
+    assert others is not None
+    told = inertial_estimate(others.fitted.problem, others.fitted.evaluation)
+    off = np.abs(told.values - truth.elements) / np.sqrt(np.diag(told.covariance))
+    known = np.array([name not in told.unobservable for name in ELEMENTS])
+    assert known.sum() >= 7
+    assert np.max(off[known]) < 3.5
+    bent = inertial_estimate(fitted.problem, fitted.evaluation)
+    assert np.max(np.abs(bent.values - truth.elements) / np.sqrt(np.diag(bent.covariance))) > 5.0

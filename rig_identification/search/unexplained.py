@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.identify import Ideal
+from rig_identification.estimate.identify import Ideal, fitted_anew, judged
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of
 from rig_identification.mismatch.findings import called, rival
 from rig_identification.mismatch.latent import AVERAGED, MissingWrench
-from rig_identification.mismatch.locate import DRIVE
+from rig_identification.mismatch.locate import DRIVE, silenced
 from rig_identification.mismatch.something_loose import loose_finding
 from rig_identification.mismatch.unknown import missing_finding
 from rig_identification.result import Finding, Mismatch
@@ -61,15 +61,38 @@ def unexplained(ideal: Ideal, outcome: Outcome, budget: Budget, notify: Notify) 
                 kept, fitted = (*others, loose), base
                 explanation = f"{', '.join(f.effect for f in kept)} explains part of it. {explanation}"
                 break
+    evidence = evidence_of(ideal, ideal.fitted, ideal.scores.holdout)
+    without = None if device in (None, DRIVE) else without_device(ideal, str(device), notify)
+    if without is not None:
+        fitted, looseness = without.fitted, hear(without.fitted).looseness
+        evidence = {**evidence, "holdout_error_after": without.scores.holdout}
+        explanation += f" The body's numbers are what everything but {device} tells."
     if budget.spent():
         explanation += f" The search ended after {budget.limit:g} units of work, short of some hypotheses."
     missing = strongest_missing(rung)
     findings = kept
     if missing is not None:
         unknown = missing_finding(missing, ideal.fitted.problem.bench.rig, device)
-        findings += (replace(unknown, evidence=evidence_of(ideal, ideal.fitted, ideal.scores.holdout)),)
+        findings += (replace(unknown, evidence=evidence),)
     told = Mismatch("unexplained", explanation, findings, alternatives)
     return Explained(fitted, told, ideal, looseness)
+
+
+def without_device(ideal: Ideal, device: str, notify: Notify) -> Ideal | None:
+    """The ideal model fitted to everything but one device; None where that leaves as much.
+
+    What is wrong with a device bends the body as long as it is heard. Where all others agree they tell it.
+    """
+    notify(f"search: everything but {device}", 0.97)
+    fitted = ideal.fitted
+    held = replace(fitted.problem, runs=(*fitted.holdout_runs, *fitted.lost), rests=())
+    quiet, point = silenced(fitted.problem, device), replace(fitted.evaluation.point, latents=())
+    try:
+        again = fitted_anew(fitted, quiet, point, silenced(held, device).runs, notify)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    left = Ideal(again, *judged(again))
+    return left if misfit(again.evaluation) < min(WRONG, misfit(fitted.evaluation)) else None
 
 
 def _partly(outcome: Outcome) -> Explained | None:
