@@ -238,7 +238,7 @@ def _stretching(standing: Standing, soft: bool, budget: Budget, say: Say) -> lis
     starts = [Promise(c, 0.0, {TAUT: 1.0 / wire}) for c in taut_cables(rig, model, mass)]
     if soft and not gives_way(model):
         elastic = cable_elasticity(rig, model, mass)
-        starts += [Promise(elastic, 0.0, {STIFFNESS: amount}) for amount in (*ropes, wire)]
+        starts += [Promise(elastic, 0.0, {STIFFNESS: amount}) for amount in ropes]
     found = [begun_with(standing, start, budget, say) for start in starts if not budget.spent()]
     return sorted((f for f in found if f is not None), key=lambda f: -f.rung.within_reach)[:1]
 
