@@ -22,6 +22,7 @@ from rig_identification.estimate.first_guess import (
     seen_whole,
     weak_prior,
 )
+from rig_identification.estimate.alike_threads import alike_threads
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.followable import followable, hanging
 from rig_identification.estimate.growing import (
@@ -67,7 +68,7 @@ from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.textbook import textbook_answers, turning_inertia
-from rig_identification.estimate.tied_to_rig import tied_note
+from rig_identification.estimate.tied_to_rig import hidden_by, hidden_note, tied_note
 from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
@@ -82,7 +83,9 @@ from rig_identification.result import (
     BodyMotion,
     ChannelFit,
     Identification,
+    InertialEstimate,
     Mismatch,
+    TextbookAnswer,
 )
 from rig_identification.rig import Rig
 
@@ -656,7 +659,8 @@ def compose(
     notes += (headings,) if headings else ()
     notes += loss_told(*basis, total)
     total = with_sources(total, *basis, loose)
-    tied = tied_note(total) if only_watched(fitted.problem) else None
+    textbook = textbook_answers(fitted.problem, alone)
+    tied = _tied(total, basis, textbook) if only_watched(fitted.problem) else None
     notes += () if tied is None else (tied,)
     frame = session.rig.frame
     return Identification(
@@ -670,9 +674,22 @@ def compose(
         converged=fitted.converged,
         notes=notes,
         joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
-        textbook=textbook_answers(fitted.problem, alone),
+        textbook=textbook,
         motions=found.motions,
     )
+
+
+def _tied(
+    total: InertialEstimate, basis: tuple[Problem, Evaluation], textbook: tuple[TextbookAnswer, ...]
+) -> str | None:
+    """What is told of a number of the description that Jzz rests on, or is hidden by; None: of none."""
+    if "Jzz" not in total.unobservable:
+        return tied_note(total)
+    hidden = hidden_by(*basis)
+    if hidden is None:
+        return None
+    threads = alike_threads(basis[0].bench.rig)
+    return hidden_note(*hidden, threads, textbook[0] if textbook else None)
 
 
 def _joint(session: Session, fitted: Fitted) -> JointInformation | None:

@@ -4,9 +4,17 @@ A value is stamped when it is published first, up to one message interval after 
 a steady clock of its own: its values lie on a straight line of time, but for those that were never published.
 The line from which all stamps are late by an interval at most is where they were measured, up to a
 constant.
+
+What sets the pace of that clock is a crystal, and it is one in all recordings. Stamps that are late by
+anything up to an interval tell the pace of a short film to some parts in ten thousand, and two films told
+apart so disagree on a swing's period by more than the swing itself leaves open. So all recordings tell one
+pace together, unless they contradict each other.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,20 +33,80 @@ PUBLISHED = 40
 FEWEST = 8
 
 
-def steady(stamp_ns: Stamps, interval: float) -> Stamps:
-    """Stamps on the device's own line of time; as they are where no line passes close by all of them.
+#: Standard deviations by which recordings may disagree on the pace of one clock.
+AGREE = 4.0
+
+
+def steady(recorded: Sequence[Stamps], interval: float) -> list[Stamps]:
+    """Stamps of each recording on the device's own line of time; as they are where no line passes close by.
 
     Parameters
     ----------
-    stamp_ns : (n,) int64
-        When each value was published first, ascending.
+    recorded : sequence of (n,) int64
+        When each value was published first, ascending, of each recording.
     interval : float
         Between two messages of the topic, s.
     """
+    breaks = [_breaks(stamps, interval) for stamps in recorded]
+    lines = [
+        None if lost is None else _line_of(lost, _seconds(stamps))
+        for stamps, lost in zip(recorded, breaks, strict=True)
+    ]
+    paces = [None if line is None else (line.pace, line.pace_std) for line in lines]
+    common = _common([pace for pace in paces if pace is not None])
+    out = []
+    for stamps, line in zip(recorded, lines, strict=True):
+        if line is None:
+            out.append(stamps)
+            continue
+        # What is late by half an interval on average stays so: a constant is the clocks' business
+        on_line = line.at(line.pace if common is None else common)
+        out.append(np.asarray(stamps[0] + np.rint(1e9 * on_line).astype(np.int64)))
+    return out
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A recording's least-squares line through its stamps."""
+
+    numbers: Array  # (n,) of each value as the device counts, about their mean
+    middle: float  # s, mean stamp
+    pace: float  # s from one value to the next
+    pace_std: float  # s
+
+    def at(self, pace: float) -> Array:
+        """(n,) s, the line through the middle at another pace."""
+        return np.asarray(self.middle + pace * self.numbers)
+
+
+def _line_of(breaks: list[int], seconds: Array) -> _Line:
+    numbers = _numbers(breaks, seconds.size)
+    numbers = numbers - np.mean(numbers)
+    spread = float(numbers @ numbers)
+    pace = float(numbers @ seconds) / spread
+    return _Line(numbers, float(np.mean(seconds)), pace, _off(breaks, seconds) / float(np.sqrt(spread)))
+
+
+def _common(paces: Sequence[tuple[float, float]]) -> float | None:
+    """s, the pace that recordings tell together; None where they contradict each other. paces: (value, std)."""
+    if not paces:
+        return None
+    value, std = np.array(paces).T
+    weight = 1.0 / np.maximum(std, 1e-12) ** 2
+    mean = float(np.average(value, weights=weight))
+    return mean if np.all(np.abs(value - mean) <= AGREE * np.maximum(std, 1e-12)) else None
+
+
+def _seconds(stamp_ns: Stamps) -> Array:
+    return np.asarray((stamp_ns - stamp_ns[0]) / 1e9)
+
+
+def _breaks(stamp_ns: Stamps, interval: float) -> list[int] | None:
+    """Where values were never published; None where no line passes close by all stamps."""
     count = len(stamp_ns)
     if count < 2 * FEWEST or interval <= 0.0:
-        return stamp_ns
-    seconds = (stamp_ns - stamp_ns[0]) / 1e9
+        return None
+    seconds = _seconds(stamp_ns)
     breaks: list[int] = []
     best = _off([], seconds)
     while (len(breaks) + 1) * PUBLISHED < count:
@@ -47,10 +115,7 @@ def steady(stamp_ns: Stamps, interval: float) -> Stamps:
         if off > LESS * best:
             break
         breaks, best = more, off
-    if best > ABOUT * interval:
-        return stamp_ns
-    # What is late by half an interval on average stays so: a constant is the clocks' business
-    return np.asarray(stamp_ns[0] + np.rint(1e9 * _line(breaks, seconds)).astype(np.int64))
+    return breaks if best <= ABOUT * interval else None
 
 
 def _off(breaks: list[int], seconds: Array) -> float:
