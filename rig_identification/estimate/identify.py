@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
 from rig_identification.estimate import noise_at_rest
+from rig_identification.estimate.alike_threads import alike_threads
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits, run_motion
 from rig_identification.estimate.enough import enough, loss_told, told
@@ -22,7 +23,6 @@ from rig_identification.estimate.first_guess import (
     seen_whole,
     weak_prior,
 )
-from rig_identification.estimate.alike_threads import alike_threads
 from rig_identification.estimate.fitted import Fitted, HeldPart
 from rig_identification.estimate.followable import followable, hanging
 from rig_identification.estimate.growing import (
@@ -675,6 +675,7 @@ def compose(
         notes=notes,
         joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
         textbook=textbook,
+        tie=tied,
         motions=found.motions,
     )
 

@@ -70,6 +70,12 @@ def hidden_note(
     formula makes of the swing; None where it is no such rig.
     """
     what, advice = WORDS[name]
+    if name == "ground scale":
+        # What hangs on the rig turns by its own weight: no other body tells this one's
+        return (
+            f"Jzz is tied to {what}: with that known it would have a standard deviation of "
+            f"{plain_figure(alone, 2)} kg m². {advice}."
+        )
     others = "hang a body of known inertia on the same rig as well, or fix one to this body in a second run"
     if name != "tolerance.hinge_position" or threads is None or textbook is None:
         return (
@@ -87,11 +93,11 @@ def hidden_note(
         f"Jzz is tied to where the hinges are. A swing tells Jzz / (d D) and no more, d {between} of the "
         f"hinges on the body and D at the ceiling: "
         f"{with_interval(textbook.value / product, inside / product, 'kg')}. As described, d D is "
-        f"{plain_figure(product)} m² to within {plain_figure(100.0 * share, 2)} % (one standard deviation), and "
-        f"Jzz {plain_figure(textbook.value)} kg m² to within as much: a share more in d and D each is twice "
-        f"that share more in Jzz. What breaks the tie: {advice[0].lower()}{advice[1:]} (to a millimetre each "
-        f"hinge: d D to within {plain_figure(100.0 * tape, 2)} %); hang the body a second time with all hinges "
-        f"moved out by one measured length; or {others}: the ratio of both needs no distance."
+        f"{plain_figure(product)} m² to within {plain_figure(100.0 * share, 2)} % (one standard deviation), "
+        f"and Jzz {plain_figure(textbook.value)} kg m² to within as much: one per cent more in d and in D is "
+        f"two per cent more in Jzz. What breaks the tie: {advice[0].lower()}{advice[1:]} (each hinge to a "
+        f"millimetre: d D to within {plain_figure(100.0 * tape, 2)} %); hang the body a second time with all "
+        f"hinges moved out by one measured length; or {others}: the ratio of both needs no distance."
     )
 
 
@@ -115,9 +121,12 @@ def tied_note(estimate: InertialEstimate) -> str | None:
         return None
     what, advice = WORDS[most.name]
     of_value = np.sqrt(variance(most)) / abs(float(estimate.values[zz]))
+    other = (
+        ", or hang a body of known inertia on the same rig as well: the ratio of both needs no such number"
+    )
     return (
         f"Jzz rests on {what}, as described: within the tolerance it may be "
         f"{plain_figure(196.0 * float(of_value), 2)} % larger or smaller with the same swing, which is "
-        f"{plain_figure(100.0 * share, 2)} % of its variance. {advice}, or hang a body of known inertia on "
-        "the same rig as well: the ratio of both needs no such number."
+        f"{plain_figure(100.0 * share, 2)} % of its variance. {advice}"
+        f"{'' if most.name == 'ground scale' else other}."
     )

@@ -56,9 +56,9 @@ def sway_frequency(rig: Rig) -> float | None:
 
 
 def sway_shapes(rig: Rig, run: Run, channel: Channel) -> Array | None:
-    """(N, 5 or 8) what a channel may read at the nodes, each column for one std; None where nothing can swing.
+    """(N, n) what a channel may read at the nodes, each column for one std; None where nothing can swing.
 
-    Eight of a camera, which reads a turn; five of a gyroscope, which has no rows.
+    n: 8 of a camera, which reads a turn row by row; 5 of a gyroscope, which has no rows.
     """
     frequency = sway_frequency(rig)
     if frequency is None or not one_turn(run):

@@ -5,10 +5,10 @@ a steady clock of its own: its values lie on a straight line of time, but for th
 The line from which all stamps are late by an interval at most is where they were measured, up to a
 constant.
 
-What sets the pace of that clock is a crystal, and it is one in all recordings. Stamps that are late by
-anything up to an interval tell the pace of a short film to some parts in ten thousand, and two films told
-apart so disagree on a swing's period by more than the swing itself leaves open. So all recordings tell one
-pace together, unless they contradict each other.
+What sets the pace of that clock is a crystal, and it is one in all recordings. How late stamps are changes
+slowly, as the two clocks slip, so that a film of T seconds tells the pace to within an interval over T: some
+parts in ten thousand. Two films told apart so disagree on a swing's period by more than the swing itself
+leaves open. So all recordings tell one pace together, unless they contradict each other.
 """
 
 from __future__ import annotations
@@ -33,10 +33,6 @@ PUBLISHED = 40
 FEWEST = 8
 
 
-#: Standard deviations by which recordings may disagree on the pace of one clock.
-AGREE = 4.0
-
-
 def steady(recorded: Sequence[Stamps], interval: float) -> list[Stamps]:
     """Stamps of each recording on the device's own line of time; as they are where no line passes close by.
 
@@ -52,8 +48,7 @@ def steady(recorded: Sequence[Stamps], interval: float) -> list[Stamps]:
         None if lost is None else _line_of(lost, _seconds(stamps))
         for stamps, lost in zip(recorded, breaks, strict=True)
     ]
-    paces = [None if line is None else (line.pace, line.pace_std) for line in lines]
-    common = _common([pace for pace in paces if pace is not None])
+    common = _common([line for line in lines if line is not None], interval)
     out = []
     for stamps, line in zip(recorded, lines, strict=True):
         if line is None:
@@ -72,7 +67,6 @@ class _Line:
     numbers: Array  # (n,) of each value as the device counts, about their mean
     middle: float  # s, mean stamp
     pace: float  # s from one value to the next
-    pace_std: float  # s
 
     def at(self, pace: float) -> Array:
         """(n,) s, the line through the middle at another pace."""
@@ -82,19 +76,18 @@ class _Line:
 def _line_of(breaks: list[int], seconds: Array) -> _Line:
     numbers = _numbers(breaks, seconds.size)
     numbers = numbers - np.mean(numbers)
-    spread = float(numbers @ numbers)
-    pace = float(numbers @ seconds) / spread
-    return _Line(numbers, float(np.mean(seconds)), pace, _off(breaks, seconds) / float(np.sqrt(spread)))
+    return _Line(numbers, float(np.mean(seconds)), float(numbers @ seconds) / float(numbers @ numbers))
 
 
-def _common(paces: Sequence[tuple[float, float]]) -> float | None:
-    """s, the pace that recordings tell together; None where they contradict each other. paces: (value, std)."""
-    if not paces:
+def _common(lines: Sequence[_Line], interval: float) -> float | None:
+    """The pace (s) that recordings tell together; None where they contradict each other."""
+    if not lines:
         return None
-    value, std = np.array(paces).T
-    weight = 1.0 / np.maximum(std, 1e-12) ** 2
-    mean = float(np.average(value, weights=weight))
-    return mean if np.all(np.abs(value - mean) <= AGREE * np.maximum(std, 1e-12)) else None
+    pace = np.array([line.pace for line in lines])
+    # Late by an interval at one end and by nothing at the other
+    off = np.array([interval / float(np.ptp(line.numbers)) for line in lines])
+    mean = float(np.average(pace, weights=1.0 / off**2))
+    return mean if np.all(np.abs(pace - mean) <= off) else None
 
 
 def _seconds(stamp_ns: Stamps) -> Array:
