@@ -220,7 +220,7 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
     theta = _rolling(half, found) if believed is None else found.theta
     parts = [(r.recording.name, free_part(problem, r, theta, found.rest)) for r in (*problem.runs, *held)]
-    free = tuple(with_noise_of_swing(part.run) for _, part in parts)
+    free = tuple(with_noise_of_swing(problem.bench.rig, part.run) for _, part in parts)
     by_hand = tuple(stretch for name, part in parts for stretch in _stretches(name, part))
     notes = tuple(_note(name, part) for name, part in parts if part.held)
     runs, held = free[: len(problem.runs)], free[len(problem.runs) :]
