@@ -13,7 +13,7 @@ from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.textbook import textbook_answers
-from rig_identification.estimate.tied_to_rig import hidden_by, hidden_note, tied_note
+from rig_identification.estimate.tied_to_rig import hidden_by, hidden_note, tie_of, tied_note
 from rig_identification.model.equilibrium import design_pose
 from rig_identification.model.motion import on_cables
 from rig_identification.result import ELEMENTS, InertialEstimate, UncertaintySource
@@ -99,6 +99,16 @@ def test_what_hides_the_inertia_is_told_with_its_factor_and_what_breaks_the_tie(
     assert "measure the distances between the hinges" in note
     assert "known inertia" in note
     assert "second time" in note
+
+
+def test_a_fit_that_bends_the_rig_hides_no_tie() -> None:
+    """Beside hinges that are known to a decimetre a fit may claim anything of the inertia."""
+    wide, close = of_tolerance(hinge_position=0.1), of_tolerance(hinge_position=1e-3)
+    claimed = estimate(noise=(0.01 * 0.0067) ** 2)
+    told = tie_of(claimed, wide, at_truth(wide), textbook_answers(wide, BODY))
+    assert told is not None
+    assert told.startswith("Jzz is tied to where the hinges are. A swing tells Jzz / (d D)")
+    assert tie_of(claimed, close, at_truth(close), textbook_answers(close, BODY)) is None
 
 
 def test_another_tolerance_that_hides_it_is_told_without_a_formula() -> None:

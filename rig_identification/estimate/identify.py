@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from rig_identification.errors import InputError
 from rig_identification.estimate import noise_at_rest
-from rig_identification.estimate.alike_threads import alike_threads
 from rig_identification.estimate.cautious import coherence, solve_cautiously
 from rig_identification.estimate.channel_fits import rest_fits, run_fits, run_motion
 from rig_identification.estimate.enough import enough, loss_told, told
@@ -68,7 +67,7 @@ from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.textbook import textbook_answers, turning_inertia
-from rig_identification.estimate.tied_to_rig import hidden_by, hidden_note, tied_note
+from rig_identification.estimate.tied_to_rig import tie_of
 from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
@@ -83,9 +82,7 @@ from rig_identification.result import (
     BodyMotion,
     ChannelFit,
     Identification,
-    InertialEstimate,
     Mismatch,
-    TextbookAnswer,
 )
 from rig_identification.rig import Rig
 
@@ -660,7 +657,7 @@ def compose(
     notes += loss_told(*basis, total)
     total = with_sources(total, *basis, loose)
     textbook = textbook_answers(fitted.problem, alone)
-    tied = _tied(total, basis, textbook) if only_watched(fitted.problem) else None
+    tied = tie_of(total, *basis, textbook) if only_watched(fitted.problem) else None
     notes += () if tied is None else (tied,)
     frame = session.rig.frame
     return Identification(
@@ -678,19 +675,6 @@ def compose(
         tie=tied,
         motions=found.motions,
     )
-
-
-def _tied(
-    total: InertialEstimate, basis: tuple[Problem, Evaluation], textbook: tuple[TextbookAnswer, ...]
-) -> str | None:
-    """What is told of a number of the description that Jzz rests on, or is hidden by; None: of none."""
-    if "Jzz" not in total.unobservable:
-        return tied_note(total)
-    hidden = hidden_by(*basis)
-    if hidden is None:
-        return None
-    threads = alike_threads(basis[0].bench.rig)
-    return hidden_note(*hidden, threads, textbook[0] if textbook else None)
 
 
 def _joint(session: Session, fitted: Fitted) -> JointInformation | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig_identification.estimate.alike_threads import AlikeThreads
+from rig_identification.estimate.alike_threads import AlikeThreads, alike_threads
 from rig_identification.estimate.observability import GAIN, root_of_inverse
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem
@@ -36,6 +36,31 @@ WORDS = {
     "tolerance.gyroscope_scale": ("the gyroscope's scale", "Turn the gyroscope by a known angle"),
     "ground scale": ("the mass", "Weigh the body closer"),
 }
+
+
+def tie_of(
+    estimate: InertialEstimate,
+    problem: Problem,
+    evaluation: Evaluation,
+    textbook: tuple[TextbookAnswer, ...],
+) -> str | None:
+    """What is told of a number of the description that Jzz rests on, or is hidden by; None: of none.
+
+    problem, evaluation: the fit that the estimate comes from. textbook: what a formula makes of the swing.
+    Where distances that are hardly known are all that the formula leaves open, the formula tells the tie,
+    whatever a fit that may bend the rig so far makes of it.
+    """
+    threads = alike_threads(problem.bench.rig)
+    if threads is not None and textbook:
+        answer = textbook[0]
+        distances = answer.shares["distances"]
+        if distances > GAIN * answer.value and distances**2 > MOST * answer.std**2:
+            alone = float(np.sqrt(answer.std**2 - distances**2))
+            return hidden_note("tolerance.hinge_position", alone, threads, answer)
+    if "Jzz" not in estimate.unobservable:
+        return tied_note(estimate)
+    hidden = hidden_by(problem, evaluation)
+    return None if hidden is None else hidden_note(*hidden, threads, textbook[0] if textbook else None)
 
 
 def hidden_by(problem: Problem, evaluation: Evaluation) -> tuple[str, float] | None:
