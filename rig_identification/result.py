@@ -172,6 +172,7 @@ class Identification:
         None  # body and rig together; None: the model leaves something, or no fit
     )
     motions: tuple[BodyMotion, ...] = ()  # of the runs, or of their parts, in the order of time
+    tie: str | None = None  # a number of the description that Jzz rests on, or is hidden by: one of ``notes``
 
 
 class Interrupted(KeyboardInterrupt):

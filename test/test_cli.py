@@ -27,6 +27,7 @@ from rig_identification.identification import Prepared
 from rig_identification.model.work import WORK
 from rig_identification.raw import RawSession
 from rig_identification.recording import Session
+from rig_identification.report import result_to_dict
 from rig_identification.result import Identification, Interrupted, Work
 
 Install = Callable[[object], None]
@@ -366,6 +367,14 @@ def test_progress_on_a_terminal_moves() -> None:
         progress.say("so far: m [1] kg")
     assert "fitting" in stream.getvalue()
     assert "so far: m [1] kg" in stream.getvalue()
+
+
+def test_summary_and_result_tell_what_an_inertia_is_tied_to(explained: Identification) -> None:
+    tied = replace(explained, tie="Jzz is tied to where the hinges are.")
+    text = summary(tied)
+    assert text.index("Jzz ") < text.index("is tied to where") < text.index("verdict")
+    assert result_to_dict(tied)["tie"] == tied.tie
+    assert "tie" not in result_to_dict(explained)
 
 
 def test_summary_names_what_is_not_determinable(explained: Identification) -> None:

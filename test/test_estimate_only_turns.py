@@ -63,6 +63,15 @@ def test_a_piece_is_as_long_as_a_swing_and_a_half_where_only_motion_is_measured(
 @pytest.mark.parametrize("noise", [1e-4, 3e-3])
 def test_what_no_swing_follows_is_noise(noise: float) -> None:
     assert beside_a_swing(TIME, swing(noise)[:, None], PERIOD)[0] == pytest.approx(noise, rel=0.2)
+    # A spectrum of a few swings has its line some per cent beside the swing's
+    assert beside_a_swing(TIME, swing(noise)[:, None], 1.02 * PERIOD)[0] == pytest.approx(noise, rel=0.2)
+
+
+def test_what_a_device_may_read_beside_a_swing_is_no_noise_of_its_samples() -> None:
+    lines = np.stack([np.cos(4.1 * TIME), np.sin(4.1 * TIME)], axis=1)
+    read = (swing(1e-3) + lines @ [0.004, -0.003])[:, None]
+    assert beside_a_swing(TIME, read, PERIOD)[0] > 2.0e-3
+    assert beside_a_swing(TIME, read, PERIOD, lines)[0] == pytest.approx(1e-3, rel=0.15)
 
 
 @pytest.mark.parametrize("noise", [1e-4, 3e-3])

@@ -85,7 +85,7 @@ def test_between_its_knots_an_error_is_straight() -> None:
 
 
 def test_of_a_tracker_s_noise_only_what_wanders_goes_with_the_pose(sessions: tuple[Session, Session]) -> None:
-    sound, hidden = (with_noise_of_swing(prepare(s.rig, s.training[0])).channels for s in sessions)
+    sound, hidden = (with_noise_of_swing(s.rig, prepare(s.rig, s.training[0])).channels for s in sessions)
     for clean, off in zip(sound, hidden, strict=True):
         assert clean.wander is not None
         assert off.wander is not None

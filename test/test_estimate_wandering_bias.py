@@ -11,7 +11,7 @@ from test_model_rigs import bifilar
 
 from rig_identification.estimate.unseen import read_beside
 from rig_identification.estimate.unseen_sway import without_sway
-from rig_identification.estimate.wandering_bias import INSTABILITY, wander_shapes
+from rig_identification.estimate.wandering_bias import CAMERA, INSTABILITY, wander_shapes
 
 RUN = run_of(session(bifilar().rig))
 RATE = next(c for c in RUN.channels if c.quantity == "angular_rate")
@@ -32,8 +32,10 @@ def test_the_shapes_are_slower_than_half_the_turn_and_have_the_power_of_flicker_
     assert nodes.size == shapes.shape[0]
 
 
-def test_an_angle_has_no_bias_that_wanders() -> None:
-    assert wander_shapes(RUN, replace(RATE, quantity="orientation")).shape[1] == 0
+def test_a_cameras_angle_wanders_by_a_share_of_a_pixel() -> None:
+    shapes = wander_shapes(RUN, RATE)
+    angles = wander_shapes(RUN, replace(RATE, quantity="orientation"))
+    assert angles == pytest.approx(CAMERA / INSTABILITY * shapes)
 
 
 def test_a_slow_bias_weighs_little_and_the_turn_as_much_as_before() -> None:

@@ -10,7 +10,10 @@ from rig_identification.result import Identification, InertialEstimate
 
 
 def summary(identification: Identification) -> str:
-    """What is wrong with the set-up, the ten numbers with half-widths of 95 % intervals, and the verdict."""
+    """What is wrong with the set-up, the ten numbers with half-widths of 95 % intervals, and the verdict.
+
+    Below the numbers stands on which number of the description one of them rests, where it does.
+    """
     if identification.without_frame is None:
         tables = [table("95 % intervals", identification.total)]
     else:
@@ -22,7 +25,7 @@ def summary(identification: Identification) -> str:
     verdict = f"verdict: {mismatch.verdict}. {mismatch.explanation}"
     examination = identification.examination
     set_up = [] if examination is None else ["\n".join(setup_lines(examination))]
-    return "\n\n".join(filter(None, [*set_up, *tables, verdict]))
+    return "\n\n".join(filter(None, [*set_up, *tables, identification.tie, verdict]))
 
 
 def table(title: str, estimate: InertialEstimate) -> str:

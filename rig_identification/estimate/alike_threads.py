@@ -23,6 +23,7 @@ class AlikeThreads:
     height: float  # m, between the hinges at rest
     product_share: float  # std of the product, relative
     height_share: float  # std of the height, relative
+    hinge: float  # m, std of where each hinge is, that product_share comes from
 
 
 def alike_threads(rig: Rig) -> AlikeThreads | None:
@@ -45,4 +46,6 @@ def alike_threads(rig: Rig) -> AlikeThreads | None:
     n, product, height = len(rig.cables), float(np.mean(R * r)), float(np.sqrt(mean**2 - lean**2))
     hinge, long = rig.tolerance["hinge_position"], rig.tolerance["cable_length"]
     ends = hinge * np.sqrt(1.0 / np.mean(R) ** 2 + 1.0 / np.mean(r) ** 2)
-    return AlikeThreads(n, product, height, float(ends / np.sqrt(n)), float(long / np.sqrt(n) / height))
+    return AlikeThreads(
+        n, product, height, float(ends / np.sqrt(n)), float(long / np.sqrt(n) / height), hinge
+    )

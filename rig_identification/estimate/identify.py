@@ -67,7 +67,7 @@ from rig_identification.estimate.sources import with_sources
 from rig_identification.estimate.stretching import Stretched, where_they_stretch, with_stretch
 from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.textbook import textbook_answers, turning_inertia
-from rig_identification.estimate.tied_to_rig import tied_note
+from rig_identification.estimate.tied_to_rig import tie_of
 from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
@@ -217,7 +217,7 @@ def _watched_start(problem: Problem, held: tuple[Run, ...], progress: Progress) 
     half = replace(problem, runs=tuple(r.between(r.grid.nodes // 2, r.grid.nodes - 1) for r in problem.runs))
     theta = _rolling(half, found) if believed is None else found.theta
     parts = [(r.recording.name, free_part(problem, r, theta, found.rest)) for r in (*problem.runs, *held)]
-    free = tuple(with_noise_of_swing(part.run) for _, part in parts)
+    free = tuple(with_noise_of_swing(problem.bench.rig, part.run) for _, part in parts)
     by_hand = tuple(stretch for name, part in parts for stretch in _stretches(name, part))
     notes = tuple(_note(name, part) for name, part in parts if part.held)
     runs, held = free[: len(problem.runs)], free[len(problem.runs) :]
@@ -656,7 +656,8 @@ def compose(
     notes += (headings,) if headings else ()
     notes += loss_told(*basis, total)
     total = with_sources(total, *basis, loose)
-    tied = tied_note(total) if only_watched(fitted.problem) else None
+    textbook = textbook_answers(fitted.problem, alone)
+    tied = tie_of(total, *basis, textbook) if only_watched(fitted.problem) else None
     notes += () if tied is None else (tied,)
     frame = session.rig.frame
     return Identification(
@@ -670,7 +671,8 @@ def compose(
         converged=fitted.converged,
         notes=notes,
         joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
-        textbook=textbook_answers(fitted.problem, alone),
+        textbook=textbook,
+        tie=tied,
         motions=found.motions,
     )
 

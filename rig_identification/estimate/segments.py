@@ -24,7 +24,9 @@ from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import CannotBeFollowed, Evaluation, Point, Problem, solve
 from rig_identification.estimate.start_state import fit_start
 from rig_identification.estimate.swing_period import beside_a_swing, long_enough, swing_period
+from rig_identification.estimate.unseen_sway import sway_shapes
 from rig_identification.model.motion import State
+from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -148,12 +150,13 @@ def _swing(run: Run, cut: tuple[Run, ...]) -> Array:
     return np.asarray(np.maximum(np.array(out), 1e-12))
 
 
-def with_noise_of_swing(run: Run) -> Run:
+def with_noise_of_swing(rig: Rig, run: Run) -> Run:
     """The run with each noise that was estimated as large as a smooth swing shows it.
 
     Neighbouring samples show a tracker's white noise alone. What wanders with the pose (markers
     hidden and found again, lens errors) is noise as well: all that a cubic over a quarter of
-    the swing's period does not follow; of samples too seldom for that, all that no swing follows.
+    the swing's period does not follow; of samples too seldom for that, all that no swing follows, nor what
+    one turn's device reads of a swing beside (unseen_sway.py).
     """
     period = swing_period(run)
 
@@ -161,7 +164,12 @@ def with_noise_of_swing(run: Run) -> Run:
         often = c.time.size / run.grid.duration * 0.25 * period > FITTED_SAMPLES
         if often:
             return sample_noise_std(c.time, c.values, 0.25 * period)
-        return beside_a_swing(c.time, c.values, period)
+        sway = sway_shapes(rig, run, c)
+        if sway is None:
+            return beside_a_swing(c.time, c.values, period)
+        nodes = run.grid.step * np.arange(run.grid.nodes)
+        seen = np.stack([np.interp(c.time, nodes, shape) for shape in sway.T], axis=1)
+        return beside_a_swing(c.time, c.values, period, seen)
 
     channels = tuple(_louder(c, heard(c)) if c.noise_estimated else c for c in run.channels)
     turned = [c for c in channels if c.device == "mocap" and c.quantity == "orientation"]

@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 
 #: Swings over which one is followed by its own line, its size and its middle changing steadily: six numbers.
 FOLLOWED = 2.0
+#: Shares by which a swing's period may differ from the strongest line of a few swings.
+ABOUT = np.linspace(-0.03, 0.03, 25)
 #: Swings that a piece holds at least where nothing but the motion is measured: inertia then shows in the
 #: period alone, and a period in no less than a turn and its half.
 SWINGS = 1.5
@@ -53,18 +55,36 @@ def long_enough(run: Run, seconds: float, swings: float = SWINGS) -> float:
     return max(seconds, min(swings * swing_period(run), run.grid.duration))
 
 
-def beside_a_swing(time: Array, values: Array, period: float) -> Array:
-    """(w,) std of what no swing of a ``period`` (s) follows in samples (n, w); 0: too few tell."""
+def beside_a_swing(time: Array, values: Array, period: float, beside: Array | None = None) -> Array:
+    """(w,) std of what no swing follows in samples (n, w); 0: too few tell.
+
+    period: s, about which the swing's own is looked for: a spectrum of a few swings is off by per cents, and
+    what a wrong period leaves is no noise. beside (n, k): what a device may read beside the swing, each
+    column in one amount over all samples, and is no noise either.
+    """
+    shapes = np.zeros((time.size, 0)) if beside is None else beside
+    tried = [_left_beside(time, values, period * (1.0 + off), shapes) for off in ABOUT]
+    return np.asarray(np.min(tried, axis=0))
+
+
+def _left_beside(time: Array, values: Array, period: float, beside: Array) -> Array:
+    """(w,) std of what a swing of exactly this period, its size and middle changing steadily, leaves."""
     block = np.floor((time - time[0]) / (FOLLOWED * period)).astype(np.int64)
-    total, freedom = np.zeros(values.shape[1]), 0
+    width, left, freedom = values.shape[1], [], 0
+    columns = np.concatenate([values, beside], axis=1)
     for number in np.unique(block):
-        t = time[block == number] / period
+        here = block == number
+        t = time[here] / period
         if t.size < 12:
             continue
         t = t - np.mean(t)
         angle = 2.0 * np.pi * t
         line = np.stack([np.ones_like(t), np.cos(angle), np.sin(angle)], axis=1)
         basis = np.linalg.qr(np.concatenate([line, t[:, None] * line], axis=1))[0]
-        rest = values[block == number] - basis @ (basis.T @ values[block == number])
-        total, freedom = total + np.sum(rest**2, axis=0), freedom + t.size - basis.shape[1]
-    return np.asarray(np.sqrt(total / max(freedom, 1)))
+        left.append(columns[here] - basis @ (basis.T @ columns[here]))
+        freedom += t.size - basis.shape[1]
+    if not left:
+        return np.zeros(width)
+    rest, read = np.split(np.concatenate(left), [width], axis=1)
+    rest = rest - read @ np.linalg.lstsq(read, rest, rcond=None)[0]
+    return np.asarray(np.sqrt(np.sum(rest**2, axis=0) / max(freedom - beside.shape[1], 1)))

@@ -57,6 +57,7 @@ def result_to_dict(
         **_vehicle(identification.vehicle),
         **({} if provenance is None else {"provenance": plain(provenance)}),
         **_textbook(identification.textbook),
+        **({} if identification.tie is None else {"tie": identification.tie}),
         **_work(identification.work),
         **({"interrupted": True} if identification.interrupted else {}),
         **({} if identification.examination is None else {"check": check_part(identification.examination)}),

@@ -23,6 +23,7 @@ from rig_identification.estimate.identify import (
 from rig_identification.estimate.observability import with_products
 from rig_identification.estimate.origins import moved, near_origins, told
 from rig_identification.estimate.solve import CannotBeFollowed
+from rig_identification.estimate.tied_to_rig import tie_of
 from rig_identification.estimate.unanswered import unanswered
 from rig_identification.estimate.unseen_sway import one_turn
 from rig_identification.estimate.vehicle import vehicle_quantities
@@ -164,7 +165,17 @@ def _answer_of(watched: Watched, session: Session, plain: Identification) -> Ide
     lost = {*answer.total.unobservable, *watched.unobservable}
     total = replace(answer.total, unobservable=with_products(lost))
     alone = vehicle_alone(total, session.rig.frame)
-    return replace(answer, total=total, without_frame=alone, figures={**answer.figures, "ideal": plain})
+    basis = watched.careful or (watched.fitted.problem, watched.fitted.evaluation)
+    tie = tie_of(total, *basis, answer.textbook)
+    notes = tuple(note for note in answer.notes if note != answer.tie)
+    return replace(
+        answer,
+        total=total,
+        without_frame=alone,
+        figures={**answer.figures, "ideal": plain},
+        tie=tie,
+        notes=notes if tie is None else (*notes, tie),
+    )
 
 
 def _worth_a_search(watched: Watched) -> bool:

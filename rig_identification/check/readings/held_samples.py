@@ -111,7 +111,7 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]], *, exa
     if slowest is None:
         return []
     quantity, hold = slowest
-    out = []
+    held: list[tuple[int, RawChannel, Flags, Flags]] = []
     for number, channel in recorded:
         shown = groups(channel).get(quantity)
         if shown is None:
@@ -120,8 +120,10 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]], *, exa
         if number in contradicted and _hold(values, shown, _changes(values, shown, least)) is None:
             continue
         same = repeats(values, shown)
-        kept = _first_of_each(same, hold.samples)
-        left = only(channel, kept) if exactly else _of_film(channel, kept, ~same)
+        held.append((number, channel, _first_of_each(same, hold.samples), ~same))
+    left_of = [only(channel, kept) for _, channel, kept, _ in held] if exactly else _of_film(held)
+    out = []
+    for (number, channel, _, _), left in zip(held, left_of, strict=True):
         rate = 1.0 / (hold.samples * interval(channel)) if interval(channel) else 0.0
         out.append(
             Spotted(
@@ -132,15 +134,20 @@ def _spotted(session: RawSession, recorded: list[tuple[int, RawChannel]], *, exa
     return out
 
 
-def _of_film(channel: RawChannel, kept: Flags, fresh: Flags) -> RawChannel:
-    """The channel with the pictures that are new, stamped when they were taken.
+def _of_film(held: list[tuple[int, RawChannel, Flags, Flags]]) -> list[RawChannel]:
+    """The channels with the pictures that are new, stamped when they were taken.
 
-    A film's stamps count its pictures, new or shown on. kept (n,): one for each time that the camera took a
-    picture. fresh (n,): those that are new: within a hair of what it was no moving signal comes to rest, and
-    a long hold is one picture where another was lost.
+    A film's stamps count its pictures, new or shown on. held: number of a recording, its channel, the samples
+    kept, one for each time that the camera took a picture, and those that are new: within a hair of what it
+    was no moving signal comes to rest, and a long hold is one picture where another was lost.
     """
-    first = only(channel, kept)
-    return only(replace(first, stamp_ns=steady(first.stamp_ns, interval(channel))), fresh[kept])
+    first = [only(channel, kept) for _, channel, kept, _ in held]
+    between = float(np.median([interval(channel) for _, channel, _, _ in held])) if held else 0.0
+    stamps = steady([one.stamp_ns for one in first], between)
+    return [
+        only(replace(one, stamp_ns=on_line), fresh[kept])
+        for one, on_line, (_, _, kept, fresh) in zip(first, stamps, held, strict=True)
+    ]
 
 
 def _combed(values: Array, columns: tuple[int, ...]) -> Array:
