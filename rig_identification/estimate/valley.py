@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.growing import NEAR_SQUARE, misfit
 from rig_identification.estimate.observability import (
     GAIN,
     believed_std,
@@ -43,6 +44,7 @@ from rig_identification.estimate.solve import (
     pinned,
     solve,
 )
+from rig_identification.estimate.swing_period import FORCES
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
@@ -58,8 +60,17 @@ NODES, FARTHER, NEGLIGIBLE = 5, 1.5, 3.0
 STEPS, SETTLED = 6, 0.05
 #: A number is held to within this part of its std.
 HELD = 0.01
+#: Such fits at most. A number that is not followed to its end by then is not told.
+FITS = 24
+#: Elements that are nowhere below nothing: no step takes more than half of them.
+POSITIVE = ("m", "Jxx", "Jyy", "Jzz")
 #: Fits from a place along a valley that lies lower than where the fit had ended.
 AGAIN = 2
+
+NOTE = (
+    "These recordings move the body so little that other bodies, with a slightly different rig each, explain "
+    "them about as well. The intervals of {names} cover those bodies."
+)
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,15 @@ class Valley:
     converged: bool | None  # ... whether the fit to it settled; None: it is where the fit had ended
     estimate: InertialEstimate  # the ten numbers there
     followed: tuple[str, ...] = ()  # numbers whose valley is not straight
+
+    @property
+    def note(self) -> str | None:
+        """What a person is told; None where every valley is straight."""
+        if not self.followed:
+            return None
+        lost = [name for name in self.followed if name in self.estimate.unobservable]
+        said = f" They do not tell {', '.join(lost)}." if lost else ""
+        return NOTE.format(names=", ".join(self.followed)) + said
 
 
 @dataclass(frozen=True)
@@ -85,11 +105,32 @@ class _Node:
     covariance: Array  # (10, 10) of the elements where u is held
 
 
-def along_valleys(problem: Problem, evaluation: Evaluation) -> Valley:
-    """The lowest place about the end of a fit, and the ten numbers there as sure as its valleys allow."""
+@dataclass
+class _Patience:
+    """Fits of all but u that are left."""
+
+    left: int = FITS
+
+
+def to_be_asked(problem: Problem, evaluation: Evaluation) -> bool:
+    """Whether the numbers of a fit are told with the covariance at its end.
+
+    Those of one that leaves more than noise are not, nor those of a body that is only watched: they come from
+    a cautious fit of short pieces (cautious.py). Rest alone tells mass and centre, along straight valleys.
+    """
+    measured = {c.quantity for run in problem.runs for c in run.channels}
+    return bool(measured & FORCES) and misfit(evaluation) < NEAR_SQUARE
+
+
+def along_valleys(problem: Problem, evaluation: Evaluation, *, lower: bool = True) -> Valley:
+    """The lowest place about the end of a fit, and the ten numbers there as sure as its valleys allow.
+
+    lower: whether to go on from a place that lies lower; without it the numbers stay those of the fit.
+    """
     converged: bool | None = None
+    patience = _Patience()
     for again in range(AGAIN + 1):
-        estimate, followed, lowest = _asked(problem, evaluation, again < AGAIN)
+        estimate, followed, lowest = _asked(problem, evaluation, patience, lower and again < AGAIN)
         if lowest is None:
             break
         evaluation, converged = solve(problem, lowest.point)
@@ -97,35 +138,49 @@ def along_valleys(problem: Problem, evaluation: Evaluation) -> Valley:
 
 
 def _asked(
-    problem: Problem, evaluation: Evaluation, lower: bool
+    problem: Problem, evaluation: Evaluation, patience: _Patience, lower: bool
 ) -> tuple[InertialEstimate, tuple[str, ...], Evaluation | None]:
     """The ten numbers, those of them whose valley bends, and a place that lies lower, at which it ends.
 
     lower: whether a lower place is of use.
     """
     estimate, followed = inertial_estimate(problem, evaluation), []
-    for element in range(INERTIAL):
-        if ELEMENTS[element] in estimate.unobservable:
+    root = root_of_inverse(evaluation.information)
+    centres = [_node(problem, evaluation, element, root) for element in range(INERTIAL)]
+    spans = [_span(problem, centre) for centre in centres]
+    # Most open first: a product of inertia falls with its moments
+    for element in sorted(range(INERTIAL), key=lambda k: -spans[k]):
+        name, centre = ELEMENTS[element], centres[element]
+        if spans[element] < STRAIGHT:
+            break
+        if name in estimate.unobservable or not _bends(problem, centre):
             continue
-        centre = _node(problem, evaluation, element)
-        if not _bends(problem, centre):
-            continue
-        followed.append(ELEMENTS[element])
-        widest = GAIN * float(believed_std(problem)[element])
-        below, above = (_one_side(problem, centre, element, sign, widest) for sign in (-1.0, 1.0))
-        nodes = [*reversed(below), centre, *above]
+        followed.append(name)
+        nodes = [centre]
+        for sign in (-1.0, 1.0):
+            side = _one_side(problem, centre, element, sign, patience)
+            nodes = [*nodes, *side] if sign > 0.0 else [*reversed(side), *nodes]
+            raised = _raised(problem, estimate, nodes)
+            if name in raised.unobservable:
+                break
         lowest = min((node.evaluation for node in nodes), key=lambda e: e.cost)
-        if lower and lowest.cost < evaluation.cost - NEARLY:
+        if lower and name not in raised.unobservable and lowest.cost < evaluation.cost - NEARLY:
             return estimate, tuple(followed), lowest
-        estimate = _raised(problem, estimate, nodes)
+        estimate = raised
+        if patience.left <= 0:
+            lost = {*estimate.unobservable, name}
+            estimate = replace(estimate, unobservable=with_products(lost))
     return estimate, tuple(followed), None
+
+
+def _span(problem: Problem, centre: _Node) -> float:
+    """How far ASKED stds of u move the body, in stds of the weak prior."""
+    return float(np.max(np.abs(ASKED * centre.std * centre.along[:INERTIAL]) / problem.weak))
 
 
 def _bends(problem: Problem, centre: _Node) -> bool:
     """Whether a straight step to either end of u's interval costs something else than Laplace says."""
     change = ASKED * centre.std * centre.along
-    if np.max(np.abs(change[:INERTIAL]) / problem.weak) < STRAIGHT:
-        return False
     here = centre.evaluation
     for step in (-change, change):
         there = evaluate(problem, moved_by(problem, here, step), residuals_only=True)
@@ -135,23 +190,25 @@ def _bends(problem: Problem, centre: _Node) -> bool:
     return False
 
 
-def _one_side(problem: Problem, centre: _Node, element: int, sign: float, widest: float) -> list[_Node]:
+def _one_side(problem: Problem, centre: _Node, element: int, sign: float, patience: _Patience) -> list[_Node]:
     """Nodes on one side of the end of a fit, outwards, as far as u may lie or until it is not told anyway."""
     nodes: list[_Node] = []
     at, likeliest, step = centre, centre.log_density, 0.0
-    while len(nodes) < NODES and at.log_density > likeliest - NEGLIGIBLE:
-        if abs(at.u - centre.u) > ASKED * widest:
+    far = ASKED * GAIN * float(believed_std(problem)[element])
+    while len(nodes) < NODES and patience.left > 0 and at.log_density > likeliest - NEGLIGIBLE:
+        if abs(at.u - centre.u) > far:
             break
         step = max(FARTHER * step, ASKED * at.std)
         to = at.u + sign * step
-        if ELEMENTS[element] in ("m", "Jxx", "Jyy", "Jzz"):
+        if ELEMENTS[element] in POSITIVE:
             to = max(to, 0.5 * at.u)
+        patience.left -= 1
         found = _held(problem, at, element, to)
         if found is None or sign * (found.u - at.u) <= 0.0:
             break
         nodes.append(found)
-        straight = abs(centre.log_density - found.log_density - 0.5 * ASKED**2) < OFF * 0.5 * ASKED**2
-        if at is centre and straight:
+        fell = centre.log_density - found.log_density
+        if at is centre and abs(fell - 0.5 * ASKED**2) < OFF * 0.5 * ASKED**2:
             break
         at, likeliest = found, max(likeliest, found.log_density)
     return nodes
@@ -184,10 +241,11 @@ def _released(problem: Problem, found: Evaluation) -> Evaluation:
     )
 
 
-def _node(problem: Problem, evaluation: Evaluation, element: int) -> _Node:
+def _node(problem: Problem, evaluation: Evaluation, element: int, root: Array | None = None) -> _Node:
+    """The place of an evaluation. root: root_of_inverse of its information, where it is there."""
     theta = evaluation.point.theta
     map_ = problem.bench.parameters.elements_jacobian(theta)
-    root = root_of_inverse(evaluation.information)
+    root = root_of_inverse(evaluation.information) if root is None else root
     aside = root[:, :INERTIAL] @ map_[element]
     std = float(np.linalg.norm(aside))
     # With the part along ``aside`` taken out of the root, u is held
