@@ -41,7 +41,7 @@ class Fitted:
 
 
 def sure_of(fitted: Fitted) -> Valley | None:
-    """What the valleys about a fit allow of the ten numbers, asked once; None where nothing is to be asked."""
+    """What the valleys about a fit allow of the ten numbers; None where nothing is to be asked."""
     known = fitted.valley
     if known is not None and known.evaluation is fitted.evaluation:
         return known

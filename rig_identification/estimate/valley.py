@@ -1,4 +1,4 @@
-"""Whether a number that is told of a body is as sure as the end of a fit says, where the body may lie far off.
+"""Whether a number that is told of a body is as sure as the end of a fit says, where it may lie far off.
 
 A short recording of a body that hardly turns holds combinations of its inertia, the rig's numbers and the
 start far tighter than each of them. Where such a valley bends, the covariance at the one place at which a fit
@@ -7,14 +7,15 @@ end nats above the bottom. So each number u that would be told is asked of the c
 
     p(u) ~ exp(-c(u)) |I(u)|^(-1/2) (g' I(u)^-1 g)^(-1/2),    g = du/dtheta,
 
-with c(u) the least cost over all else and I(u) the information there: its marginal density by Laplace's method
-over all but u (Tierney and Kadane, Journal of the American Statistical Association 81, 1986). The numbers are
-those of the lowest place; their covariance is raised to the second moment about it over the nodes of u.
+with c(u) the least cost over all else and I(u) the information there: its marginal density by Laplace's
+method over all but u (Tierney and Kadane, Journal of the American Statistical Association 81, 1986). The
+numbers are those of the lowest place; their covariance is raised to the second moment about it over the
+nodes of u.
 
 What is spent follows what is open. A number whose interval moves the body by little is not asked: a body that
 was shaken well costs nothing. One that costs at both ends of its interval what Laplace says takes two
-evaluations without derivatives. One that is open as far as one would believe without any recording is followed
-no farther, for it is not told.
+evaluations without derivatives. One that is open as far as one would believe without any recording is
+followed no farther, for it is not told.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ Array = NDArray[np.float64]
 #: Stds at which a number is asked, and part of what the cost should rise by there that it may be off by: its
 #: std is then right within a quarter.
 ASKED, OFF = 2.0, 0.5
-#: Body within whose change by ASKED stds valleys are straight, in stds of the weak prior: a tenth of a moment.
+#: Change of the body by ASKED stds within which valleys are straight, in stds of the weak prior: of a moment
+#: of inertia a tenth.
 STRAIGHT = 0.1
 #: Nodes on each side at most, factor from one step to the next, and nats below the likeliest that end a side.
 NODES, FARTHER, NEGLIGIBLE = 5, 1.5, 3.0
@@ -259,7 +261,7 @@ def _node(problem: Problem, evaluation: Evaluation, element: int, root: Array | 
 
 
 def _raised(problem: Problem, estimate: InertialEstimate, nodes: list[_Node]) -> InertialEstimate:
-    """The estimate with its covariance raised to what the nodes show; what is then as open as belief, lost."""
+    """The estimate with its covariance raised to what the nodes show, and without what is then vague."""
     u = np.array([node.u for node in nodes])
     log = np.array([node.log_density for node in nodes])
     share = np.exp(log - np.max(log)) * _widths(u)
