@@ -82,7 +82,9 @@ class Valley:
     evaluation: Evaluation  # the lowest place
     converged: bool | None  # ... whether the fit to it settled; None: it is where the fit had ended
     estimate: InertialEstimate  # the ten numbers there
+    began: Evaluation  # where the fit had ended
     followed: tuple[str, ...] = ()  # numbers whose valley is not straight
+    fits: int = 0  # of all but one number, which it took
 
     @property
     def note(self) -> str | None:
@@ -129,14 +131,14 @@ def along_valleys(problem: Problem, evaluation: Evaluation, *, lower: bool = Tru
 
     lower: whether to go on from a place that lies lower; without it the numbers stay those of the fit.
     """
-    converged: bool | None = None
+    began, converged = evaluation, None
     patience = _Patience()
     for again in range(AGAIN + 1):
         estimate, followed, lowest = _asked(problem, evaluation, patience, lower and again < AGAIN)
         if lowest is None:
             break
         evaluation, converged = solve(problem, lowest.point)
-    return Valley(evaluation, converged, estimate, followed)
+    return Valley(evaluation, converged, estimate, began, followed, FITS - patience.left)
 
 
 def _asked(
@@ -146,7 +148,8 @@ def _asked(
 
     lower: whether a lower place is of use.
     """
-    estimate, followed = inertial_estimate(problem, evaluation), []
+    estimate = inertial_estimate(problem, evaluation)
+    followed: list[str] = []
     root = root_of_inverse(evaluation.information)
     centres = [_node(problem, evaluation, element, root) for element in range(INERTIAL)]
     spans = [_span(problem, centre) for centre in centres]
