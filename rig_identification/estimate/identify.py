@@ -486,7 +486,11 @@ def _lowest(
     """Where a fit ends once its valleys are asked, whether it settled there, and what they allow."""
     if not to_be_asked(problem, evaluation):
         return evaluation, converged, None
-    valley = along_valleys(problem, evaluation)
+    try:
+        valley = along_valleys(problem, evaluation)
+    except np.linalg.LinAlgError:
+        # Recordings that tell so little that no information can be inverted
+        return evaluation, converged, None
     return valley.evaluation, converged if valley.converged is None else valley.converged, valley
 
 

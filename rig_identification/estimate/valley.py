@@ -226,9 +226,9 @@ def _held(problem: Problem, at: _Node, element: int, to: float) -> _Node | None:
     for point in (ahead, at.evaluation.point):
         try:
             found, _ = solve(held, point, iterations=STEPS, tolerance=SETTLED)
-        except CannotBeFollowed:
+            return _node(problem, _released(held, found), element)
+        except (CannotBeFollowed, np.linalg.LinAlgError):
             continue
-        return _node(problem, _released(held, found), element)
     return None
 
 
