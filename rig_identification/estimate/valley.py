@@ -3,14 +3,19 @@
 A short recording of a body that hardly turns holds combinations of its inertia, the rig's numbers and the
 start far tighter than each of them. Where such a valley bends, the covariance at the one place at which a fit
 ends (Laplace) is that of a straight valley: it may be a tenth of what is open, and the fit may creep to its
-end nats above the bottom. So each number u that would be told is asked of the cost itself,
+end nats above the bottom. So each number u that would be told is asked of the cost itself: it is held
+elsewhere, and all else is fitted anew. Two things say how likely the place is that comes out:
 
-    p(u) ~ exp(-c(u)) |I(u)|^(-1/2) (g' I(u)^-1 g)^(-1/2),    g = du/dtheta,
+    c(u)                                            the least cost (profile likelihood)
+    c(u) + log |I(u)| / 2 + log(g' I(u)^-1 g) / 2   with how much room there is about it, g = du/dtheta
 
-with c(u) the least cost over all else and I(u) the information there: its marginal density by Laplace's
-method over all but u (Tierney and Kadane, Journal of the American Statistical Association 81, 1986). The
-numbers are those of the lowest place; their covariance is raised to the second moment about it over the
-nodes of u.
+The second is the marginal density of u by Laplace's method over all but u (Tierney and Kadane, Journal of the
+American Statistical Association 81, 1986). It depends on the coordinates of the body, the first does not.
+Where a valley is straight both rise by d = z^2 / 2 at z standard deviations from the end of the fit. Elsewhere
+the smaller rise d counts. The covariance C of the ten numbers is raised until the body that was found there,
+off by x, lies where its likelihood says, within sqrt(2 d) standard deviations:
+
+    C + b x x',    b = 1 / (2 d) - 1 / (x' C^-1 x) > 0.
 
 What is spent follows what is open. A number whose interval moves the body by little is not asked: a body that
 was shaken well costs nothing. One that costs at both ends of its interval what Laplace says takes two
@@ -46,6 +51,7 @@ from rig_identification.estimate.solve import (
     solve,
 )
 from rig_identification.estimate.swing_period import FORCES
+from rig_identification.model.definite import definite
 from rig_identification.result import ELEMENTS, InertialEstimate
 
 Array = NDArray[np.float64]
@@ -56,8 +62,11 @@ ASKED, OFF = 2.0, 0.5
 #: Change of the body by ASKED stds within which valleys are straight, in stds of the weak prior: of a moment
 #: of inertia a tenth.
 STRAIGHT = 0.1
-#: Nodes on each side at most, factor from one step to the next, and nats below the likeliest that end a side.
-NODES, FARTHER, NEGLIGIBLE = 5, 1.5, 3.0
+#: Places on each side at most, factor from one step to the next, and nats by which one is so unlikely that it
+#: is the last.
+PLACES, FARTHER, NEGLIGIBLE = 5, 1.5, 3.0
+#: Nats of a place one std away: what is likelier lies no nearer.
+ONE_STD = 0.5
 #: Steps of a fit of all but u, and what one may still promise at its end (nats).
 STEPS, SETTLED = 6, 0.05
 #: A number is held to within this part of its std.
@@ -106,7 +115,11 @@ class _Node:
     along: Array  # change of every unknown with u, by the information there
     log_density: float  # up to a constant
     elements: Array  # (10,)
-    covariance: Array  # (10, 10) of the elements where u is held
+
+    def rises(self, centre: _Node) -> tuple[float, float]:
+        """Nats by which cost and marginal density say that this place is less likely than ``centre``."""
+        cost = self.evaluation.cost - centre.evaluation.cost
+        return cost, centre.log_density - self.log_density
 
 
 @dataclass
@@ -161,11 +174,10 @@ def _asked(
         if name in estimate.unobservable or not _bends(problem, centre):
             continue
         followed.append(name)
-        nodes = [centre]
+        nodes, raised = [centre], estimate
         for sign in (-1.0, 1.0):
             side = _one_side(problem, centre, element, sign, patience)
-            nodes = [*nodes, *side] if sign > 0.0 else [*reversed(side), *nodes]
-            raised = _raised(problem, estimate, nodes)
+            nodes, raised = [*nodes, *side], _raised(problem, raised, centre, side)
             if name in raised.unobservable:
                 break
         lowest = min((node.evaluation for node in nodes), key=lambda e: e.cost)
@@ -196,13 +208,11 @@ def _bends(problem: Problem, centre: _Node) -> bool:
 
 
 def _one_side(problem: Problem, centre: _Node, element: int, sign: float, patience: _Patience) -> list[_Node]:
-    """Nodes on one side of the end of a fit, outwards, as far as u may lie or until it is not told anyway."""
+    """Places on one side, outwards, as far as u may lie or until it is not told anyway."""
     nodes: list[_Node] = []
-    at, likeliest, step = centre, centre.log_density, 0.0
+    at, step = centre, 0.0
     far = ASKED * GAIN * float(believed_std(problem)[element])
-    while len(nodes) < NODES and patience.left > 0 and at.log_density > likeliest - NEGLIGIBLE:
-        if abs(at.u - centre.u) > far:
-            break
+    while len(nodes) < PLACES and patience.left > 0 and abs(at.u - centre.u) < far:
         step = max(FARTHER * step, ASKED * at.std)
         to = at.u + sign * step
         if ELEMENTS[element] in POSITIVE:
@@ -212,10 +222,11 @@ def _one_side(problem: Problem, centre: _Node, element: int, sign: float, patien
         if found is None or sign * (found.u - at.u) <= 0.0:
             break
         nodes.append(found)
-        fell = centre.log_density - found.log_density
-        if at is centre and abs(fell - 0.5 * ASKED**2) < OFF * 0.5 * ASKED**2:
+        rises = found.rises(centre)
+        straight = at is centre and all(abs(r - 0.5 * ASKED**2) < OFF * 0.5 * ASKED**2 for r in rises)
+        if straight or min(rises) > NEGLIGIBLE:
             break
-        at, likeliest = found, max(likeliest, found.log_density)
+        at = found
     return nodes
 
 
@@ -253,41 +264,31 @@ def _node(problem: Problem, evaluation: Evaluation, element: int, root: Array | 
     root = root_of_inverse(evaluation.information) if root is None else root
     aside = root[:, :INERTIAL] @ map_[element]
     std = float(np.linalg.norm(aside))
-    # With the part along ``aside`` taken out of the root, u is held
-    rest = root[:, :INERTIAL] @ map_.T
-    rest -= np.outer(aside, aside @ rest) / std**2
     volume = float(np.sum(np.log(np.diag(root))))
     elements = problem.bench.parameters.elements(theta)
     density = -evaluation.cost + volume - float(np.log(std))
     along = np.asarray(root.T @ aside) / std**2
-    return _Node(evaluation, float(elements[element]), std, along, density, elements, rest.T @ rest)
+    return _Node(evaluation, float(elements[element]), std, along, density, elements)
 
 
-def _raised(problem: Problem, estimate: InertialEstimate, nodes: list[_Node]) -> InertialEstimate:
-    """The estimate with its covariance raised to what the nodes show, and without what is then vague."""
-    u = np.array([node.u for node in nodes])
-    log = np.array([node.log_density for node in nodes])
-    share = np.exp(log - np.max(log)) * _widths(u)
-    share /= np.sum(share)
-    away = [node.elements - estimate.values for node in nodes]
-    moments = [node.covariance + np.outer(x, x) for node, x in zip(nodes, away, strict=True)]
-    moment = np.tensordot(share, np.array(moments), axes=1)
-    covariance = estimate.covariance + _positive(moment - estimate.covariance)
+def _raised(
+    problem: Problem, estimate: InertialEstimate, centre: _Node, nodes: list[_Node]
+) -> InertialEstimate:
+    """The estimate with a covariance that holds the places found, and without what is then vague."""
+    covariance = estimate.covariance
+    for node in nodes:
+        away = node.elements - centre.elements
+        likely = max(ONE_STD, min(node.rises(centre)))
+        beyond = 0.5 / likely - 1.0 / _squared_stds(covariance, away)
+        covariance = covariance + max(0.0, beyond) * np.outer(away, away)
     std = np.sqrt(np.diag(covariance))
     vague = {n for n, s, b in zip(ELEMENTS, std, believed_std(problem), strict=True) if not s < GAIN * b}
     lost = with_products({*estimate.unobservable, *vague})
     return replace(estimate, covariance=covariance, unobservable=lost)
 
 
-def _widths(u: Array) -> Array:
-    """Weights of the trapezoidal rule."""
-    gaps = np.diff(u)
-    return np.asarray(0.5 * (np.concatenate([gaps, [0.0]]) + np.concatenate([[0.0], gaps])))
-
-
-def _positive(matrix: Array) -> Array:
-    """What a symmetric matrix adds to a covariance: where it takes away, nothing."""
-    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(root @ root.T)
+def _squared_stds(covariance: Array, away: Array) -> float:
+    """x' C^-1 x."""
+    scale = np.sqrt(np.diag(covariance))
+    x = away / scale
+    return float(x @ np.linalg.solve(definite(covariance / np.outer(scale, scale)), x))
