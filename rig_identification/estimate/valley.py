@@ -12,8 +12,8 @@ elsewhere, and all else is fitted anew. Two things say how likely the place is t
 The second is the marginal density of u by Laplace's method over all but u (Tierney and Kadane, Journal of the
 American Statistical Association 81, 1986). It depends on the coordinates of the body, the first does not.
 Where a valley is straight both rise by d = z^2 / 2 at z standard deviations from the end of the fit.
-Elsewhere the smaller rise d counts. The covariance C of the ten numbers is raised until the body that was found there,
-off by x, lies where its likelihood says, within sqrt(2 d) standard deviations:
+Elsewhere the smaller rise d counts. The covariance C of the ten numbers is raised until the body that was
+found there, off by x, lies where its likelihood says, within sqrt(2 d) standard deviations:
 
     C + b x x',    b = 1 / (2 d) - 1 / (x' C^-1 x) > 0.
 
