@@ -60,7 +60,7 @@ def test_a_pin_holds_a_number_and_can_be_taken_out_again(three_cables: tuple[Ses
 
 
 def test_along_a_straight_valley_the_density_is_normal(three_cables: tuple[Session, Fitted]) -> None:
-    """Two stds off, all else fitted anew, both rise by two nats: the std is right by a quarter."""
+    """Two stds off, all else fitted anew, both rise by two nats: the std is right within a quarter."""
     fitted = three_cables[1]
     here = _node(fitted.problem, fitted.evaluation, JXX)
     std = np.sqrt(inertial_estimate(fitted.problem, fitted.evaluation).covariance[JXX, JXX])

@@ -57,8 +57,8 @@ from rig_identification.result import ELEMENTS, InertialEstimate
 Array = NDArray[np.float64]
 
 #: Stds at which a number is asked, and part of what the cost should rise by there that it may be off by: its
-#: std is then right within a quarter.
-ASKED, OFF = 2.0, 0.5
+#: std is then right within a sixth.
+ASKED, OFF = 2.0, 0.25
 #: Change of the body by ASKED stds within which valleys are straight, in stds of the weak prior: of a moment
 #: of inertia a tenth.
 STRAIGHT = 0.1
