@@ -8,6 +8,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.estimate.stretching import Stretched
+from rig_identification.estimate.valley import Valley, along_valleys, to_be_asked
 from rig_identification.model.motion import State
 
 
@@ -36,3 +37,14 @@ class Fitted:
     lost: tuple[Run, ...] = ()  # held-out runs that cannot be followed from any start state
     unfollowed: tuple[str, ...] = ()  # recordings that the model could not follow when the fit began
     stretch: Stretched | None = None  # where the cables of the ideal model stretch from the first guess on
+    valley: Valley | None = None  # what its fit's valleys allow of the ten numbers; None: not asked
+
+
+def sure_of(fitted: Fitted) -> Valley | None:
+    """What the valleys about a fit allow of the ten numbers; None where nothing is to be asked."""
+    known = fitted.valley
+    if known is not None and known.evaluation is fitted.evaluation:
+        return known
+    if not to_be_asked(fitted.problem, fitted.evaluation):
+        return None
+    return along_valleys(fitted.problem, fitted.evaluation, lower=False)

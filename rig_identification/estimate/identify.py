@@ -22,7 +22,7 @@ from rig_identification.estimate.first_guess import (
     seen_whole,
     weak_prior,
 )
-from rig_identification.estimate.fitted import Fitted, HeldPart
+from rig_identification.estimate.fitted import Fitted, HeldPart, sure_of
 from rig_identification.estimate.followable import followable, hanging
 from rig_identification.estimate.growing import (
     HOPELESS_SQUARE,
@@ -69,6 +69,7 @@ from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.textbook import textbook_answers, turning_inertia
 from rig_identification.estimate.tied_to_rig import tie_of
 from rig_identification.estimate.unseen_sway import one_turn
+from rig_identification.estimate.valley import Valley, along_valleys, to_be_asked
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -459,6 +460,7 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         # The valleys of a body that is only watched are curved: what a step wins says little of what is left
         evaluation, converged = solve(start.problem, evaluation.point, iterations=FOLLOWED, tolerance=1e-3)
         converged = converged or as_good_as_settled(start.problem, evaluation, LEFT)
+    evaluation, converged, valley = _lowest(start.problem, evaluation, converged)
     progress("predicting held-out runs", 0.6)
     held_runs, held_out, lost = predicted(start.problem, start.held, evaluation.point.theta, start.rest)
     return Fitted(
@@ -474,7 +476,22 @@ def fit_from(start: Start, progress: Progress = _silent) -> Fitted:
         lost,
         start.unfollowed,
         start.stretch,
+        valley,
     )
+
+
+def _lowest(
+    problem: Problem, evaluation: Evaluation, converged: bool
+) -> tuple[Evaluation, bool, Valley | None]:
+    """Where a fit ends once its valleys are asked, whether it settled there, and what they allow."""
+    if not to_be_asked(problem, evaluation):
+        return evaluation, converged, None
+    try:
+        valley = along_valleys(problem, evaluation)
+    except np.linalg.LinAlgError:
+        # Recordings that tell so little that no information can be inverted
+        return evaluation, converged, None
+    return valley.evaluation, converged if valley.converged is None else valley.converged, valley
 
 
 @dataclass(frozen=True)
@@ -639,7 +656,8 @@ def compose(
     if careful is not None:
         loose *= coherence(*careful)
     basis = careful or (fitted.problem, fitted.evaluation)
-    total = inertial_estimate(*basis)
+    valley = None if careful is not None else sure_of(fitted)
+    total = inertial_estimate(*basis) if valley is None else valley.estimate
     covariance = loose * total.covariance
     if careful is None and fitted.converged:
         covariance = covariance + unsettled(*basis)
@@ -647,6 +665,8 @@ def compose(
     total = mixture(alone, rivals)
     wider = np.sqrt(np.diag(total.covariance) / np.diag(alone.covariance))
     notes = fitted.notes + ((CAUTION,) if careful else ())
+    if valley is not None and valley.note is not None:
+        notes += (valley.note,)
     errors = pose_errors(fitted)
     if errors and not any(finding.where.get("law") == LAW for finding in mismatch.findings):
         notes += (pose_error_text(errors),)
@@ -670,19 +690,22 @@ def compose(
         training_error=found.training,
         converged=fitted.converged,
         notes=notes,
-        joint=_joint(session, fitted) if careful is None and mismatch.verdict != "unexplained" else None,
+        joint=_joint(session, fitted, valley)
+        if careful is None and mismatch.verdict != "unexplained"
+        else None,
         textbook=textbook,
         tie=tied,
         motions=found.motions,
     )
 
 
-def _joint(session: Session, fitted: Fitted) -> JointInformation | None:
+def _joint(session: Session, fitted: Fitted, valley: Valley | None) -> JointInformation | None:
     """Body and rig together; None where the fit did not converge, or its body is too thin to be inverted.
 
-    Nor is there one of a model that leaves something: nobody knows which errors another session shares.
+    Nor is there one of a model that leaves something: nobody knows which errors another session shares. Nor
+    along a valley that bends: information at one place holds the body tighter than the recordings do.
     """
-    if not fitted.converged:
+    if not fitted.converged or (valley is not None and valley.followed):
         return None
     try:
         return joint_information(session, fitted.problem, fitted.evaluation)

@@ -50,6 +50,15 @@ LONGEST_STEP = 0.5
 
 
 @dataclass(frozen=True)
+class Pin:
+    """One of the ten elements, held at a value while all else is fitted."""
+
+    element: int
+    value: float
+    std: float  # far less than anything tells of it
+
+
+@dataclass(frozen=True)
 class Problem:
     """What is fitted to what."""
 
@@ -64,6 +73,7 @@ class Problem:
     extra_noise: Array | None = None  # (6, 6) random wrench over a node interval: what the model lacks
     discrepancy: Discrepancy | None = None  # ... as a wrench that goes on, at rest as well
     taken: tuple[int, ...] = ()  # entries of the weak prior that are believed (hung_by_eye.py)
+    pin: Pin | None = None  # one of the ten elements that is held (valley.py)
 
 
 @dataclass(frozen=True)
@@ -122,7 +132,19 @@ def _prior(problem: Problem, theta: Array) -> tuple[float, Array, Array]:
         cost += 0.5 * miss**2
         information[:INERTIAL, :INERTIAL] += np.outer(row, row)
         gradient[:INERTIAL] += row * miss
+    if problem.pin is not None:
+        row, miss = pinned(problem, problem.pin, theta)
+        cost += 0.5 * miss**2
+        information[:INERTIAL, :INERTIAL] += np.outer(row, row)
+        gradient[:INERTIAL] += row * miss
     return cost, information, gradient
+
+
+def pinned(problem: Problem, pin: Pin, theta: Array) -> tuple[Array, float]:
+    """(10,) derivatives of a pinned element by the body's vector, and what it misses, both in stds."""
+    parameters = problem.bench.parameters
+    value = float(parameters.elements(theta)[pin.element])
+    return parameters.elements_jacobian(theta)[pin.element] / pin.std, (pin.value - value) / pin.std
 
 
 def evaluate(problem: Problem, point: Point, *, residuals_only: bool = False) -> Evaluation | None:
