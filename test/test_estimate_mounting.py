@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -55,7 +57,10 @@ def test_a_stiff_mount_shows_the_motion_itself_and_a_soft_one_more() -> None:
 def test_derivatives_of_a_run_are_those_of_its_residuals() -> None:
     problem, theta, _ = pose_problem(recorded(thesis_case_14(), duration=3.0)[0])
     quantities = {c.quantity for run in problem.runs for c in run.channels}
-    *_, both = soft_mounts(problem.bench.parameters, quantities)
+    *_, mount = soft_mounts(problem.bench.parameters, quantities)
+    assert mount.closer is not None
+    here = SimpleNamespace(point=SimpleNamespace(theta=theta))
+    ((both, _),) = mount.closer(problem, here)  # type: ignore[arg-type]
     assert len(both.parameters) == 6
     wide = extended(problem, (both,))
     parameters, run = wide.bench.parameters, wide.runs[0]

@@ -93,14 +93,19 @@ def needed_gain(candidate: Candidate, count: int, numbers: int | None = None) ->
 
 
 def net_gain(promise: Promise, count: int) -> float:
-    """What a promise gains (nats) beyond what noise gives one of ``count``.
+    """What a promise gains (nats) beyond what noise gives one of ``count``."""
+    return promise.gain - needed_gain(promise.candidate, count)
 
-    What it adds has to earn its keep beside what it frees (a test of nested models): with its cells' zeros
-    free, a law of two cells that feel each other would explain whatever shifts them.
+
+def earned_gain(promise: Promise, count: int) -> float:
+    """The same, where what it adds has no more than that to show for itself beside what it frees.
+
+    Nested models are compared by what they do not share: with its cells' zeros free, a law of two cells that
+    feel each other would explain whatever shifts them. Beside a wrench first order is no bound, so this ranks
+    promises and excludes none.
     """
-    candidate = promise.candidate
-    net = promise.gain - needed_gain(candidate, count)
+    net = net_gain(promise, count)
     if promise.of_added is None:
         return net
-    added = sum(not q.freed for q in candidate.parameters)
-    return min(net, promise.of_added - needed_gain(candidate, count, added))
+    added = sum(not q.freed for q in promise.candidate.parameters)
+    return min(net, promise.of_added - needed_gain(promise.candidate, count, added))

@@ -9,6 +9,7 @@ import numpy as np
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import Parameter, ParameterSet
+from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.candidate import Candidate, Told
 
 #: Plausible 1/w^2 (s^2) of a mount, of 6 Hz, and its damping ratio, of rubber.
@@ -28,7 +29,14 @@ def soft_mounts(parameters: ParameterSet, channels: set[str]) -> list[Candidate]
     ]
 
 
-def _mount(parameters: ParameterSet, quantities: tuple[str, ...]) -> Candidate:
+def _mount(parameters: ParameterSet, quantities: tuple[str, ...], *, delayed: bool = False) -> Candidate:
+    """delayed: with a delay of its own, which a mount has not: a closer description of what rings."""
+
+    def closer(problem: Problem, evaluation: Evaluation) -> list[tuple[Candidate, dict[str, float]]]:
+        values = problem.bench.parameters.named(evaluation.point.theta)
+        own = _mount(parameters, quantities, delayed=True)
+        return [(own, {p.name: values.get(p.name, 0.0) for p in own.parameters})]
+
     soft, damped, late = [], [], []
     for quantity in quantities:
         entry, stem = parameters.places.mount(quantity), f"imu.mount.{quantity}"
@@ -49,17 +57,19 @@ def _mount(parameters: ParameterSet, quantities: tuple[str, ...]) -> Candidate:
             own = found.following(lambda k: float(1.0 / (2.0 * np.pi * np.sqrt(max(k, 1e-12)))), k.name)
             out[f"frequency_{word}"] = (*own, "Hz")
             out[f"damping_ratio_{word}"] = (*found.of(z.name), "1")
-            out[f"delay_{word}"] = (*found.of(delay.name), "s")
+            if delayed:
+                out[f"delay_{word}"] = (*found.of(delay.name), "s")
         lowest = min((v for name, v in out.items() if name.startswith("frequency")), key=lambda v: v[0])
         return {"frequency": lowest, **out}
 
     parts = " and ".join("accelerometer" if q == "specific_force" else "gyroscope" for q in quantities)
     return Candidate(
         "sensor_resonance",
-        (*soft, *damped, *late),
+        (*soft, *damped, *(late if delayed else ())),
         f"The IMU's {parts} shows a resonance, at {{value}}: motion looks larger than it is.",
         "Bolt the IMU to the frame without foam or rubber, and look at its filter's settings.",
         {"channel": "imu", "axis": None},
         positive=len(quantities),
         tell=told,
+        closer=None if delayed else closer,
     )
