@@ -97,15 +97,16 @@ def net_gain(promise: Promise, count: int) -> float:
     return promise.gain - needed_gain(promise.candidate, count)
 
 
-def earned_gain(promise: Promise, count: int) -> float:
-    """The same, where what it adds has no more than that to show for itself beside what it frees.
+def stood_for(promise: Promise, others: list[Promise], count: int) -> bool:
+    """Whether a special case of a hypothesis promises as much: what its further numbers add is chance.
 
-    Nested models are compared by what they do not share: with its cells' zeros free, a law of two cells that
-    feel each other would explain whatever shifts them. Beside a wrench first order is no bound, so this ranks
-    promises and excludes none.
+    With its cells' zeros free a law of two cells that feel each other promises what each zero does, and more.
     """
-    net = net_gain(promise, count)
-    if promise.of_added is None:
-        return net
-    added = sum(not q.freed for q in promise.candidate.parameters)
-    return min(net, promise.of_added - needed_gain(promise.candidate, count, added))
+    own = {p.name for p in promise.candidate.parameters}
+    for other in others:
+        part = {p.name for p in other.candidate.parameters}
+        if part < own:
+            further = needed_gain(promise.candidate, count, len(own) - len(part))
+            if promise.gain - other.gain < further:
+                return True
+    return False

@@ -75,8 +75,6 @@ class Promise:
     values: dict[str, float]  # its parameters, in their own units
     charge: float | None = None  # nats that evidence charges it for what it could have explained, if known
     elsewhere: tuple[Promise, ...] = ()  # about as much of the same, at other numbers
-    #: Of the gain (nats), what the numbers that it adds have over those that it only frees, where it has both
-    of_added: float | None = None
 
 
 def with_reference(problem: Problem, rest: State) -> Problem:
@@ -180,10 +178,7 @@ def promise_of(wide: Problem, beyond: Beyond, boxed: Boxed, candidate: Candidate
     free = {q.name: q for q in wide.bench.parameters.free}
     step = boxed.step(candidate.parameters, candidate.positive)
     values = {q.name: free[q.name].value(z) for q, z in zip(candidate.parameters, step.values, strict=True)}
-    of_added, freed = None, [q for q in candidate.parameters if q.freed]
-    if freed and not candidate.doubted:
-        of_added = step.gain - boxed.step(freed, 0).gain
-    return Promise(candidate, step.gain, values, _charge(wide, beyond, candidate), of_added=of_added)
+    return Promise(candidate, step.gain, values, charge=_charge(wide, beyond, candidate))
 
 
 def _charge(wide: Problem, beyond: Beyond, candidate: Candidate) -> float | None:

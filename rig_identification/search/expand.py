@@ -17,7 +17,7 @@ from rig_identification.estimate.stretching import STIFFNESS
 from rig_identification.mismatch.amounts import supports
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.hypotheses import compatible, count_of, earned_gain, net_gain
+from rig_identification.mismatch.hypotheses import compatible, count_of, net_gain, stood_for
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
 from rig_identification.mismatch.same_clock import contradicted
@@ -323,11 +323,12 @@ def _with_twins(promises: list[Promise]) -> Iterator[Promise]:
 def worthy(promises: list[Promise], count: int) -> list[Promise]:
     """The promises worth a fit: of each kind the best ones, as many as are fitted."""
     out: list[Promise] = []
-    least = SHARE * max((p.gain for p in promises), default=0.0)
-    for promise in sorted(promises, key=lambda p: -earned_gain(p, count)):
-        if len(out) == FITTED:
+    for promise in sorted(promises, key=lambda p: -net_gain(p, count)):
+        if net_gain(promise, count) <= 0.0 or len(out) == FITTED:
             break
-        if net_gain(promise, count) <= 0.0 or promise.gain < least:
+        if out and promise.gain < SHARE * out[0].gain:
+            break
+        if stood_for(promise, promises, count):
             continue
         if sum(promise.candidate.kind == other.candidate.kind for other in out) < ALIKE:
             out.append(promise)
