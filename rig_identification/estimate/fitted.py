@@ -8,7 +8,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.estimate.stretching import Stretched
-from rig_identification.estimate.valley import Valley, along_valleys, to_be_asked
+from rig_identification.estimate.valley import Valley, valley_of
 from rig_identification.model.motion import State
 
 
@@ -45,6 +45,4 @@ def sure_of(fitted: Fitted) -> Valley | None:
     known = fitted.valley
     if known is not None and known.evaluation is fitted.evaluation:
         return known
-    if not to_be_asked(fitted.problem, fitted.evaluation):
-        return None
-    return along_valleys(fitted.problem, fitted.evaluation, lower=False)
+    return valley_of(fitted.problem, fitted.evaluation, lower=False)

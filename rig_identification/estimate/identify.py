@@ -69,7 +69,7 @@ from rig_identification.estimate.swing_period import FORCES
 from rig_identification.estimate.textbook import textbook_answers, turning_inertia
 from rig_identification.estimate.tied_to_rig import tie_of
 from rig_identification.estimate.unseen_sway import one_turn
-from rig_identification.estimate.valley import Valley, along_valleys, to_be_asked
+from rig_identification.estimate.valley import Valley, valley_of
 from rig_identification.estimate.verdict import judge
 from rig_identification.estimate.watched_mount import mount_from_track, without_mocap
 from rig_identification.estimate.whichever_way import whichever_way
@@ -484,12 +484,8 @@ def _lowest(
     problem: Problem, evaluation: Evaluation, converged: bool
 ) -> tuple[Evaluation, bool, Valley | None]:
     """Where a fit ends once its valleys are asked, whether it settled there, and what they allow."""
-    if not to_be_asked(problem, evaluation):
-        return evaluation, converged, None
-    try:
-        valley = along_valleys(problem, evaluation)
-    except np.linalg.LinAlgError:
-        # Recordings that tell so little that no information can be inverted
+    valley = valley_of(problem, evaluation)
+    if valley is None:
         return evaluation, converged, None
     return valley.evaluation, converged if valley.converged is None else valley.converged, valley
 

@@ -139,6 +139,16 @@ def to_be_asked(problem: Problem, evaluation: Evaluation) -> bool:
     return bool(measured & FORCES) and misfit(evaluation) < NEAR_SQUARE
 
 
+def valley_of(problem: Problem, evaluation: Evaluation, *, lower: bool = True) -> Valley | None:
+    """What :func:`along_valleys` says; None where nothing is asked, or no information can be inverted."""
+    if not to_be_asked(problem, evaluation):
+        return None
+    try:
+        return along_valleys(problem, evaluation, lower=lower)
+    except np.linalg.LinAlgError:
+        return None
+
+
 def along_valleys(problem: Problem, evaluation: Evaluation, *, lower: bool = True) -> Valley:
     """The lowest place about the end of a fit, and the ten numbers there as sure as its valleys allow.
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.model.so3 import skew
+
 Array = NDArray[np.float64]
 
 #: Standard deviation of the random wrench's mean over a tenth of a second, as a share of the weight.
@@ -49,8 +51,8 @@ class Push:
 
 #: Share of the peak at which a push begins and ends.
 EDGE = 0.15
-#: Share of the largest eigenvalue below which a force turns too little to tell where along it it acts.
-NARROW, TINY = 1e-3, 1e-30
+#: Share of the largest singular value below which a force turns too little to tell where along it it acts.
+NARROW, TINY = 1e-3**0.5, 1e-30
 
 
 def strongest_push(missing: MissingWrench, middle: Array) -> Push:
@@ -66,10 +68,7 @@ def strongest_push(missing: MissingWrench, middle: Array) -> Push:
         b += 1
     quiet = np.concatenate([size[:a], size[b + 1 :]])
     here = missing.wrench[a : b + 1] - np.median(missing.wrench, axis=0)
-    # Least squares over the push: moment about the datum = point x force
-    rows = np.concatenate([-_cross(f) for f in here[:, :3]])
-    right = np.concatenate([m - np.cross(middle, f) for f, m in zip(here[:, :3], here[:, 3:], strict=True)])
-    offset = np.linalg.lstsq(rows, right, rcond=0.05)[0]
+    offset = _arm(here[:, :3], here[:, 3:] - np.cross(middle, here[:, :3]), 0.05)
     spread = float(np.sqrt(np.mean(quiet**2))) if quiet.size else float("nan")
     return Push(float(missing.time[a]), float(missing.time[b]), force[k], spread, middle + offset)
 
@@ -90,15 +89,14 @@ def line_of_action(missing: MissingWrench, middle: Array) -> LineOfAction:
     """
     wrench = missing.wrench - np.mean(missing.wrench, axis=0)
     force, about = wrench[:, :3], wrench[:, 3:] - np.cross(middle, wrench[:, :3])
-    # |offset x F|^2 and the products with M, summed over the course
-    normal = np.sum(force**2) * np.eye(3) - force.T @ force
-    right = np.sum(np.cross(force, about), axis=0)
-    values, vectors = np.linalg.eigh(normal)
-    told = values > NARROW * values[-1]
-    offset = vectors[:, told] @ ((vectors[:, told].T @ right) / values[told])
+    offset = _arm(force, about, NARROW)
     left = about - np.cross(offset, force)
     return LineOfAction(middle + offset, 1.0 - float(np.sum(left**2) / max(np.sum(about**2), TINY)))
 
 
-def _cross(v: Array) -> Array:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+def _arm(force: Array, moment: Array, narrow: float) -> Array:
+    """(3,) arm with which ``force`` (n, 3) makes ``moment`` (n, 3) in least squares: arm x force.
+
+    narrow: share of the largest singular value below which the force turns too little to tell the arm.
+    """
+    return np.asarray(np.linalg.lstsq(-skew(force).reshape(-1, 3), moment.reshape(-1), rcond=narrow)[0])

@@ -79,10 +79,11 @@ def _compliance_prior(rig: Rig, mass: float) -> float:
     return 0.005 / (mass * rig.gravity)
 
 
-def _block(axis: int, damping: float, frequency: float) -> Array:
+def _block(along: Array, damping: float, frequency: float, hinge: int = 0) -> Array:
+    """Block of a ceiling. along (3,): world; hinge: see layout.py."""
     block = np.zeros((1, layout.INTERNAL_SIZE))
-    block[0, layout.KIND] = layout.CEILING
-    block[0, layout.AXIS + axis] = 1.0
+    block[0, layout.KIND], block[0, layout.HINGE] = layout.CEILING, hinge
+    block[0, layout.AXIS : layout.AXIS + 3] = along
     block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = frequency, damping
     return block
 
@@ -122,7 +123,7 @@ def ceiling_candidate(
                 names, (layout.FREQUENCY, layout.DAMPING_RATIO), strict=True
             )
         ]
-        block = _block(axis, PROBE_DAMPING if probe else DAMPING, frequency)
+        block = _block(np.eye(3)[axis], PROBE_DAMPING if probe else DAMPING, frequency)
         return model.with_internal(block), (compliance,) if probe else (compliance, *more)
 
     def told(found: Estimates) -> Told:
@@ -198,12 +199,8 @@ def taut_cables(rig: Rig, model: RigModel, mass: float) -> list[Candidate]:
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
         first, entries = model.internal, []
         for i, cable in enumerate(rig.cables):
-            block = np.zeros((1, layout.INTERNAL_SIZE))
-            block[0, layout.KIND], block[0, layout.HINGE] = layout.CEILING, i + 1
-            block[0, layout.AXIS : layout.AXIS + 3] = along[i]
-            block[0, layout.FREQUENCY], block[0, layout.DAMPING_RATIO] = TAUT_FREQUENCY, TAUT_DAMPING
             entries.append((place.internal_block(model.cables, first + i) + layout.COMPLIANCE, cable.length))
-            model = model.with_internal(block)
+            model = model.with_internal(_block(along[i], TAUT_DAMPING, TAUT_FREQUENCY, i + 1))
         own = Parameter(
             TAUT,
             "1/N",
@@ -224,20 +221,11 @@ def taut_cables(rig: Rig, model: RigModel, mass: float) -> list[Candidate]:
         left = problem.discrepancy is not None or shows(evaluation)
         if here * usual_stiffness(rig, mass) < (BOUNCE / TAUTEST) ** 2 or not left:
             return []
-        return [(cable_elasticity(rig, model, mass), {STIFFNESS: 1.0 / here})]
+        return [(soft, {STIFFNESS: 1.0 / here})]
 
+    soft, own = cable_elasticity(rig, model, mass), build(model)[1]
     return [
-        Candidate(
-            "cable_elasticity",
-            build(model)[1],
-            "The cables stretch: their axial stiffness EA is {value}.",
-            "Keep the stretch in the model; no steel rope is stiff enough to leave it out.",
-            {"channel": None, "axis": None},
-            positive=1,
-            tell=told,
-            build=build,
-            closer=elastic,
-        )
+        replace(soft, parameters=own, positive=1, tell=told, build=build, settle=None, closer=elastic),
     ]
 
 

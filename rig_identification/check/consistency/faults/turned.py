@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rig_identification.check.consistency.evidence import Evidence
+from rig_identification.check.consistency.evidence import Account, Evidence
 from rig_identification.check.consistency.hypothesis import Change, Hypothesis, fault
 from rig_identification.check.consistency.measured import ORDINARY, TINY
 from rig_identification.check.consistency.motion import INDEPENDENT
 from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import BIAS
-from rig_identification.check.consistency.trajectory import Trajectory, rotation
+from rig_identification.check.consistency.trajectory import rotation
 from rig_identification.examination import SetupFault
 from rig_identification.model.so3 import nearest_rotation
 from rig_identification.quantity import with_interval
@@ -160,21 +160,18 @@ def _sought(evidence: Evidence, rig: Rig, described: Mount) -> tuple[Found, ...]
     The other devices tell the motion first; with the IMU on that mount all tell it better. How well the mount
     is known only the motion says that does without the IMU. None where that tells none, or the described one.
     """
-    runs, account = evidence.session.runs, evidence.without(frozenset(["imu"]))
-    if not runs or not account.motions:
+    beside = _beside(evidence)
+    if beside is None:
         return ()
-    run, still = runs[0], evidence.session.at_rest[0].values.get("imu")
-    known = np.asarray(np.isfinite(run.values.get("imu", np.full((1, 6), np.nan))).all(axis=1))
-    if np.count_nonzero(known) < FEWEST:
-        return ()
-    read, alone = run.values["imu"][known], _along(rig, account.motions[0].trajectory, known)
+    known, read, account = beside
+    still, alone = evidence.session.at_rest[0].values.get("imu"), _along(rig, account, known)
     size = _size_of(rig)
     out: tuple[Found, ...] = ()
     for fit in range(FITS):
         if account.rest is None or not account.motions:
             break
-        at, hangs = _along(rig, account.motions[0].trajectory, known), None
-        if not (np.isfinite(at.proper).all() and np.isfinite(at.lever).all()):
+        at, hangs = _along(rig, account, known), None
+        if not at.is_finite:
             return ()
         if still is not None and np.isfinite(still[0, 3:]).all():
             hangs = (still[0, 3:], rig.gravity * account.rest.poses[0][1][2])
@@ -195,21 +192,17 @@ def _aside(evidence: Evidence, rig: Rig, described: Mount) -> Found | None:
     The other devices tell the motion first; with the IMU in that place all tell it better. None where the
     motion leaves the described place open.
     """
-    runs, account = evidence.session.runs, evidence.without(frozenset(["imu"]))
-    if not runs or not account.motions:
+    beside = _beside(evidence)
+    if beside is None:
         return None
-    values = runs[0].values.get("imu", np.full((1, 6), np.nan))
-    known = np.asarray(np.isfinite(values).all(axis=1))
-    if np.count_nonzero(known) < FEWEST:
-        return None
-    read, R = values[known], rotation(described)
-    alone = _along(rig, account.motions[0].trajectory, known)
+    known, read, account = beside
+    alone, R = _along(rig, account, known), rotation(described)
     size, found = _size_of(rig), None
     for _ in range(FITS):
         if account.rest is None or not account.motions:
             break
-        at = _along(rig, account.motions[0].trajectory, known)
-        if not (np.isfinite(at.proper).all() and np.isfinite(at.lever).all()):
+        at = _along(rig, account, known)
+        if not at.is_finite:
             return None
         place = _place(at.lever, read[:, 3:] @ R.T - at.proper, described.position, size)
         mount = replace(described, position=place)
@@ -218,6 +211,19 @@ def _aside(evidence: Evidence, rig: Rig, described: Mount) -> Found | None:
             return None
         account = evidence.judged(of_place(described, found))
     return found
+
+
+def _beside(evidence: Evidence) -> tuple[NDArray[np.bool_], Array, Account] | None:
+    """Instants (n,) at which the IMU reads, what it reads at them (k, 6), and the motion without it.
+
+    None where nothing else tells a motion, or the IMU reads hardly anything.
+    """
+    runs, account = evidence.session.runs, evidence.without(frozenset(["imu"]))
+    if not runs or not account.motions:
+        return None
+    values = runs[0].values.get("imu", np.full((1, 6), np.nan))
+    known = np.asarray(np.isfinite(values).all(axis=1))
+    return (known, values[known], account) if np.count_nonzero(known) >= FEWEST else None
 
 
 def _size_of(rig: Rig) -> float:
@@ -242,8 +248,14 @@ class Along:
     proper: Array  # (N, 3) m/s^2, specific force at the datum
     lever: Array  # (N, 3, 3) 1/s^2, times a place: specific force there beyond the datum's
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether the motion is one at all."""
+        return bool(np.isfinite(self.proper).all() and np.isfinite(self.lever).all())
 
-def _along(rig: Rig, at: Trajectory, known: NDArray[np.bool_]) -> Along:
+
+def _along(rig: Rig, account: Account, known: NDArray[np.bool_]) -> Along:
+    at = account.motions[0].trajectory
     rate = at.rate[known]
     turning = skew(rate)
     lever = skew(at.rate_change[known]) + turning @ turning
