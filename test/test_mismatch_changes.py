@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from test_simulate_identify import at_the_true_body, shaken
 
+from rig_identification.estimate.estimates import Estimates
+from rig_identification.estimate.marginal import marginal
 from rig_identification.estimate.parameters import Parameter, Stretch
 from rig_identification.estimate.solve import evaluate
-from rig_identification.mismatch.changes import Change, likeliest_changes
+from rig_identification.mismatch.change import Change
+from rig_identification.mismatch.changes import likeliest_changes
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.model.body import (
@@ -80,9 +83,35 @@ def test_a_zero_that_jumps_within_a_run_is_found_with_its_instant(clean: tuple[S
     assert change is not None
     assert change.candidate.effect == "load_cell_offset"
     assert change.candidate.where["channel"] == "cable_2"
-    assert change.within is not None
+    assert len(change.within) == 1
     assert [s.recording for s in change.stretches] == ["run_1"]
-    assert change.within.start == pytest.approx(3.2, abs=0.1)
+    assert change.within[0].start == pytest.approx(3.2, abs=0.1)
+
+
+def test_a_zero_that_jumps_twice_is_found_with_both_instants(clean: tuple[Session, Truth]) -> None:
+    session = altered(
+        clean[0], "run_1", lambda r: zeroed(zeroed(r, "cable_2", 2.0, 6.0), "cable_2", 4.2, -9.0)
+    )
+    change = change_in(session, clean[1])
+    assert change is not None
+    assert change.candidate.effect == "load_cell_offset"
+    assert [s.start for s in change.within] == pytest.approx([2.0, 4.2], abs=0.1)
+    names = [p.name for p in change.candidate.parameters]
+    found = change.candidate.told(
+        Estimates(dict(zip(names, (6.0, -9.0), strict=True)), np.diag([0.04, 0.12]))
+    )
+    assert found["offset"] == (pytest.approx(-3.0), pytest.approx(0.4), "N")
+    assert found["offset_step_2"][0] == pytest.approx(-9.0)
+
+
+def test_steps_that_nothing_parts_are_told_together(clean: tuple[Session, Truth]) -> None:
+    session = altered(
+        clean[0], "run_1", lambda r: zeroed(zeroed(r, "cable_2", 3.0, 6.0), "cable_2", 3.7, 6.0)
+    )
+    change = change_in(session, clean[1])
+    assert change is not None
+    assert len(change.within) >= 2
+    assert len(change.candidate.parameters) == 1
 
 
 def test_an_imu_that_was_bumped_between_two_runs_is_found(clean: tuple[Session, Truth]) -> None:
@@ -91,6 +120,18 @@ def test_an_imu_that_was_bumped_between_two_runs_is_found(clean: tuple[Session, 
     assert change is not None
     assert change.candidate.effect == "imu_misalignment"
     assert change.stretches == (Stretch("run_2"),)
+
+
+def test_columns_come_back_from_what_was_integrated_out() -> None:
+    random = np.random.default_rng(1)
+    responses, columns = 3.0 * random.normal(size=(40, 3)), random.normal(size=(40, 5))
+    off, _ = marginal(responses)
+    np.testing.assert_allclose(off.without(off.back(columns)), columns, atol=1e-10)
+    seen = off.without(columns)
+    together = responses.T @ columns
+    np.testing.assert_allclose(
+        seen.T @ seen, columns.T @ columns - together.T @ off.taken @ together, atol=1e-9
+    )
 
 
 def test_nothing_changes_in_a_clean_session(clean: tuple[Session, Truth]) -> None:
@@ -125,7 +166,7 @@ def without_a_load(spec: SessionSpec, mass: float, at: Array) -> SessionSpec:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["zero", "turn", "load", "held"])
+@pytest.mark.parametrize("kind", ["zero", "twice", "turn", "load", "held"])
 def test_a_session_in_which_something_changed_is_explained(kind: str) -> None:
     spec = two_runs(20.0)
     spec = replace(spec, runs=(spec.runs[0], replace(spec.runs[1], holdout=True)))
@@ -134,6 +175,11 @@ def test_a_session_in_which_something_changed_is_explained(kind: str) -> None:
         session = altered(session, "run_1", lambda r: zeroed(r, "cable_2", 8.0, 25.0))
         session = altered(session, "run_2", lambda r: zeroed(r, "cable_2", 0.0, 25.0))
         effect, name, value = "load_cell_offset", "offset", 25.0
+    elif kind == "twice":
+        session = altered(session, "run_1", lambda r: zeroed(r, "cable_2", 8.0, 25.0))
+        session = altered(session, "run_1", lambda r: zeroed(r, "cable_2", 14.0, -40.0))
+        session = altered(session, "run_2", lambda r: zeroed(r, "cable_2", 0.0, -15.0))
+        effect, name, value = "load_cell_offset", "offset", -15.0
     elif kind == "turn":
         session = altered(session, "run_1", lambda r: turned(r, 9.0, 2.0))
         effect, name, value = "imu_misalignment", "angle", np.radians(2.0)

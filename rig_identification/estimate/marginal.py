@@ -25,6 +25,19 @@ class Marginal(NamedTuple):
         """Columns (m, c) less what the amounts account for."""
         return np.asarray(columns - self.responses @ (self.weights @ (self.responses.T @ columns)))
 
+    def back(self, columns: Array) -> Array:
+        """Inverse of :meth:`without`: columns (m, c) as they are beside these amounts.
+
+        With W = (1 + B B^T)^(-1/2) it is W (1 + B B^T).
+        """
+        return self.without(columns + self.responses @ (self.responses.T @ columns))
+
+    @property
+    def taken(self) -> Array:
+        """(z, z) N of the amounts' share in what columns have in common: W^2 = 1 - B N B^T."""
+        size = self.responses.shape[1]
+        return np.asarray(np.linalg.inv(np.eye(size) + self.responses.T @ self.responses))
+
 
 def marginal(responses: Array) -> tuple[Marginal, float]:
     """What amounts with whitened ``responses`` (m, z) do, and what they add to the sum of log std."""

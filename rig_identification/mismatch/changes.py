@@ -9,24 +9,26 @@ information F and gradient g, in units of its prior, and adds to the log evidenc
     1/2 g^T (F + 1)^-1 g - 1/2 log det(F + 1).
 From that the logarithm of the number of hypotheses is taken. A change between two recordings is as likely
 beforehand as one within any of them.
+
+What changed once may change again. Beside the steps that are known, another one of the same numbers has the
+information that these leave of it; steps are added while they add to the log evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
-from rig_identification.estimate.parameters import AXES, INERTIAL, Parameter, ParameterSet, Stretch
+from rig_identification.estimate.parameters import INERTIAL, Parameter, ParameterSet, Stretch
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.beyond import Beyond
-from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.change import Change, Group, within
 from rig_identification.mismatch.screen import Promise, opened_with, promise_of
 from rig_identification.model import layout
 from rig_identification.model.body import linear_in_log_cholesky
@@ -43,45 +45,8 @@ LOAD = 0.03
 #: Changes that are fitted at most, and the share of the best one's evidence that another one has to come to:
 #: first order is right within a factor of two.
 ALIKE, SHARE = 4, 0.5
-
-
-@dataclass(frozen=True)
-class Group:
-    """Numbers that change together, as columns of a problem's vector."""
-
-    numbers: tuple[Parameter, ...]  # of the change
-    columns: Array  # (size, k) in units of their priors
-    of: Candidate | None  # the same, wrong all the time; None: the body
-
-
-@dataclass(frozen=True)
-class Change:
-    """Numbers that are other ones in some stretches of a session's recordings."""
-
-    group: Group
-    stretches: tuple[Stretch, ...]  # in which they are
-    net: float  # nats that it adds to the log evidence, to first order
-    durations: Mapping[str, float]  # s, of every recording
-
-    @cached_property
-    def candidate(self) -> Candidate:
-        """The hypothesis."""
-        return _changed(self.group, self.stretches, self.durations)
-
-    def lasting(self, recordings: Mapping[str, float]) -> Change:
-        """The same through further ``recordings``, which last so many s."""
-        durations = {**self.durations, **recordings}
-        return replace(self, stretches=(*self.stretches, *map(Stretch, recordings)), durations=durations)
-
-    def with_fewer(self, candidates: list[Candidate]) -> list[Change]:
-        """Changes of fewer numbers in the same stretches. candidates: what may be wrong all the time."""
-        fewer = (c for c in candidates if changeable(c) and len(c.parameters) < len(self.group.numbers))
-        return [replace(self, group=Group(c.parameters, np.zeros((0, len(c.parameters))), c)) for c in fewer]
-
-    @property
-    def within(self) -> Stretch | None:
-        """The stretch that begins within its recording; None where it happened between two of them."""
-        return _within(self.stretches)
+#: Steps of the same numbers that are told apart at most.
+STEPS = 6
 
 
 def likeliest_changes(
@@ -104,9 +69,13 @@ def likeliest_changes(
             best[told.group] = told
     ranked = sorted(best.values(), key=lambda told: -told.net)
     ranked = [t for t in ranked[:ALIKE] if t.net > SHARE * ranked[0].net]
-    finer = [max([t, *asked.near(t)], key=lambda told: told.net) for t in ranked]
     durations = {name: r.duration for name, r in recordings_of(problem).items()}
-    changes = [Change(groups[t.group], t.stretches, t.net, durations) for t in finer]
+    changes = []
+    for t in ranked:
+        steps = asked.stepped(max([t, *asked.near(t)], key=lambda told: told.net))
+        changes.append(
+            Change(groups[t.group], tuple(s.stretches for s in steps), sum(s.net for s in steps), durations)
+        )
     return sorted(changes, key=lambda change: -change.net), always
 
 
@@ -186,13 +155,42 @@ class _Told:
 
 @dataclass(frozen=True)
 class _Part:
-    """Sums over some rows of a run or a rest pose: they tell all that a restricted column needs."""
+    """Sums over some rows of runs and rest poses: they tell all that restricted columns need.
+
+    What each run's zeros are off by is integrated out of its rows (estimate/marginal.py), and mixes all of
+    them. So columns C are restricted before that, and W C stands in the whitened problem, W being symmetric.
+    With its columns J they have J^T W C in common, which has the rows of C alone, and with one another
+    C^T W^2 C = C^T C - (B^T C)^T N (B^T C).
+    """
 
     cross: Array  # (unknowns, q) of all unknowns' columns with the asked ones
     right: Array  # (q,) gradient
+    gram: Array  # (q, q) C^T C
+    zeros: tuple[Array, ...]  # of every run, (z, q) B^T C
 
     def __add__(self, other: _Part) -> _Part:
-        return _Part(self.cross + other.cross, self.right + other.right)
+        zeros = tuple(a + b for a, b in zip(self.zeros, other.zeros, strict=True))
+        return _Part(self.cross + other.cross, self.right + other.right, self.gram + other.gram, zeros)
+
+    def of(self, columns: NDArray[np.int64]) -> _Part:
+        """Some of the asked columns."""
+        zeros = tuple(z[:, columns] for z in self.zeros)
+        return _Part(self.cross[:, columns], self.right[columns], self.gram[np.ix_(columns, columns)], zeros)
+
+
+@dataclass(frozen=True)
+class _Restricted:
+    """Columns of numbers, and then those of a run's start, from an instant on."""
+
+    stretches: tuple[Stretch, ...]  # in which they count
+    part: _Part
+    run: int | None  # whose start is another one then; None: none is
+    charge: float  # log of how many hypotheses there are
+
+    def cut_to(self, group: NDArray[np.int64], count: int) -> _Restricted:
+        """The same of one group's columns alone, of ``count`` numbers, and the start's."""
+        starts = np.arange(count, self.part.right.size)
+        return replace(self, part=self.part.of(np.concatenate([group, starts])))
 
 
 class _Asked:
@@ -207,31 +205,95 @@ class _Asked:
         self._of = [np.arange(end - len(g.numbers), end) for end, g in zip(ends, groups, strict=True)]
         starts = [run.jacobian.shape[1] - self._size for run in full.runs]
         self._places = self._size + np.concatenate([[0], np.cumsum(starts)]).astype(int)
+        # W J and W r of every run
+        self._across = [(r.wander.without(r.jacobian), r.wander.without(r.residual)) for r in full.runs]
         self._whole = {name: self._of_recording(name) for name in self._recordings()}
         instants = sum(self._instants(i).size for i in range(len(full.runs)))
         between = max(1, len(self._between()))
         count = 2.0 * len(groups)
-        self._charge_between, self._charge_within = np.log(count * between), np.log(count * max(1, instants))
+        self._charge_between = float(np.log(count * between))
+        self._charge_within = float(np.log(count * max(1, instants)))
 
     def all(self) -> Iterator[_Told]:
         """Every group in every set of recordings, and from every instant on."""
-        for names in self._between():
-            part = sum((self._whole[n] for n in names[1:]), self._whole[names[0]])
-            yield from self._told(part, tuple(map(Stretch, names)), None, self._charge_between)
-        for index in range(len(self._full.runs)):
-            yield from self._from_instants(index, self._instants(index))
+        for restricted in (*self._from_recordings(), *self._from_all_instants()):
+            yield from self._told(restricted)
 
     def near(self, best: _Told) -> Iterator[_Told]:
         """The same group from instants about the best one's on."""
-        there = _within(best.stretches)
-        if there is None:
-            return
+        for restricted in self._about(best.stretches):
+            yield self._net(restricted, best.group, ())
+
+    def stepped(self, first: _Told) -> list[_Told]:
+        """Further steps of the same numbers that add to the evidence of the ``first``, the oldest first.
+
+        Where a number stays what it became, it may become another one again at any time. What counts in one
+        recording alone is asked again there alone.
+        """
+        group = first.group
+        lasts = self._lasts(first.stretches)
+        found = [(first, self._at(first.stretches))]
+        asked = [r for r in self._from_all_instants() if self._nested(r, first, lasts)]
+        while len(found) < STEPS:
+            known = [restricted for _, restricted in found]
+            best = max(
+                ((self._net(r, group, known), r) for r in asked), key=lambda told: told[0].net, default=None
+            )
+            if best is None or best[0].net <= 0.0:
+                break
+            finer = [r for r in self._about(best[0].stretches) if self._nested(r, first, lasts)]
+            told = [best, *((self._net(r, group, known), r) for r in finer)]
+            found.append(max(told, key=lambda told: told[0].net))
+            asked = [r for r in asked if self._apart(r.stretches, found[-1][0].stretches)]
+        return [told for told, _ in sorted(found, key=lambda f: self._time(f[0].stretches))]
+
+    def _nested(self, restricted: _Restricted, first: _Told, lasts: bool) -> bool:
+        """Whether a step may stand beside the first one: of any two, one has all rows of the other."""
+        one, two = restricted.stretches, first.stretches
+        if not self._apart(one, two):
+            return False
+        return self._lasts(one) if lasts else len(one) == 1 and one[0].recording == two[0].recording
+
+    def _lasts(self, stretches: tuple[Stretch, ...]) -> bool:
+        """Whether a number is another one in everything that was recorded later."""
+        names = self._recordings()
+        return [s.recording for s in stretches] == names[names.index(stretches[0].recording) :]
+
+    def _time(self, stretches: tuple[Stretch, ...]) -> tuple[int, float]:
+        """What orders steps: recording, and seconds in it."""
+        return self._recordings().index(stretches[0].recording), stretches[0].start
+
+    def _apart(self, one: tuple[Stretch, ...], two: tuple[Stretch, ...]) -> bool:
+        return one[0].recording != two[0].recording or abs(one[0].start - two[0].start) >= APART
+
+    def _about(self, stretches: tuple[Stretch, ...]) -> Iterator[_Restricted]:
+        """The same stretches from instants about theirs on."""
+        there = within(stretches)
         for index, run in enumerate(self._problem.runs):
-            if not _holds(run, there):
-                continue
-            at = there.start - run.offset + np.arange(-APART, APART, FINELY)
-            at = at[(at > LEFT) & (at < run.grid.duration - LEFT)]
-            yield from (t for t in self._from_instants(index, at) if t.group == best.group)
+            if there is not None and _holds(run, there):
+                at = there.start - run.offset + np.arange(-APART, APART, FINELY)
+                at = at[(at > LEFT) & (at < run.grid.duration - LEFT)]
+                of = self._from_instants(index, at)
+                yield from (r for r in of if len(r.stretches) == len(stretches))
+
+    def _at(self, stretches: tuple[Stretch, ...]) -> _Restricted:
+        """Exactly these stretches."""
+        there = within(stretches)
+        if there is None:
+            return next(r for r in self._from_recordings() if r.stretches == stretches)
+        index = next(i for i, run in enumerate(self._problem.runs) if _holds(run, there))
+        at = np.array([there.start - self._problem.runs[index].offset])
+        return next(r for r in self._from_instants(index, at) if len(r.stretches) == len(stretches))
+
+    def _from_recordings(self) -> Iterator[_Restricted]:
+        """Every set of recordings in which a number may be another one."""
+        for names in self._between():
+            part = sum((self._whole[n] for n in names[1:]), self._whole[names[0]])
+            yield _Restricted(tuple(map(Stretch, names)), part, None, self._charge_between)
+
+    def _from_all_instants(self) -> Iterator[_Restricted]:
+        for index in range(len(self._full.runs)):
+            yield from self._from_instants(index, self._instants(index))
 
     def _recordings(self) -> list[str]:
         """Names of all recordings, the oldest first where their stamps tell."""
@@ -251,196 +313,151 @@ class _Asked:
         duration = self._problem.runs[index].grid.duration
         return np.arange(LEFT, duration - LEFT, APART) if duration > 2.0 * LEFT else np.zeros(0)
 
+    def _nothing(self, columns: int) -> _Part:
+        """Sums over no rows."""
+        zeros = tuple(np.zeros((run.wander.responses.shape[1], columns)) for run in self._full.runs)
+        cross = np.zeros((int(self._places[-1]), columns))
+        return _Part(cross, np.zeros(columns), np.zeros((columns, columns)), zeros)
+
     def _of_recording(self, name: str) -> _Part:
         """Sums over all of a recording."""
-        total = _Part(np.zeros((int(self._places[-1]), self._maps.shape[1])), np.zeros(self._maps.shape[1]))
+        total = self._nothing(self._maps.shape[1])
         for index, run in enumerate(self._problem.runs):
             if run.recording.name == name:
-                total += self._rows(index, slice(None), self._maps)
+                total += self._rows(index, slice(None), self._columns(index, self._maps))
         for evidence, rest in zip(self._problem.rests, self._full.rests, strict=True):
             if evidence.recording.name == name:
                 columns = rest.jacobian @ self._maps
                 cross = np.zeros_like(total.cross)
                 cross[: self._size] = rest.jacobian.T @ columns
-                total += _Part(cross, columns.T @ rest.residual)
+                none = tuple(np.zeros_like(z) for z in total.zeros)
+                total += _Part(cross, columns.T @ rest.residual, columns.T @ columns, none)
         return total
 
-    def _rows(self, index: int, rows: slice, maps: Array) -> _Part:
-        """Sums over some rows of a run. maps (size + starts or size, q): what is asked."""
+    def _columns(self, index: int, maps: Array) -> Array:
+        """(m, q) columns of a run beside its zeros' own deviations. maps (size + starts or size, q)."""
         run = self._full.runs[index]
-        jacobian = run.jacobian[rows]
-        columns = jacobian[:, : maps.shape[0]] @ maps
-        own = jacobian.T @ columns
-        cross = np.zeros((int(self._places[-1]), maps.shape[1]))
+        return run.wander.back(run.jacobian[:, : maps.shape[0]] @ maps)
+
+    def _rows(self, index: int, rows: slice, columns: Array) -> _Part:
+        """Sums over some rows of a run's ``columns``."""
+        run = self._full.runs[index]
+        columns = columns[rows]
+        jacobian, residual = self._across[index]
+        own = jacobian[rows].T @ columns
+        nothing = self._nothing(columns.shape[1])
+        cross = nothing.cross
         cross[: self._size] = own[: self._size]
         cross[self._places[index] : self._places[index + 1]] = own[self._size :]
-        return _Part(cross, columns.T @ run.residual[rows])
+        zeros = list(nothing.zeros)
+        zeros[index] = run.wander.responses[rows].T @ columns
+        return _Part(cross, columns.T @ residual[rows], columns.T @ columns, tuple(zeros))
 
-    def _from_instants(self, index: int, instants: Array) -> Iterator[_Told]:
-        """Every group from each of some instants (s after its first node) of a run on."""
+    def _from_instants(self, index: int, instants: Array) -> Iterator[_Restricted]:
+        """All groups from each of some instants (s after its first node) of a run on."""
         run, lin = self._problem.runs[index], self._full.runs[index]
         starts = lin.jacobian.shape[1] - self._size
         maps = np.zeros((self._size + starts, self._maps.shape[1] + starts))
         maps[: self._size, : self._maps.shape[1]] = self._maps
         maps[self._size :, self._maps.shape[1] :] = np.eye(starts)
+        columns = self._columns(index, maps)
         names = self._recordings()
         later = names[names.index(run.recording.name) + 1 :]
         rest = self._later(later, starts)
         # What follows within the same recording, where a run was cut already, changes too
         for other, of in enumerate(self._problem.runs):
             if of.recording is run.recording and of.offset > run.offset:
-                rest += self._wider(self._rows(other, slice(None), self._maps), starts)
+                rest += self._wider(self._rows(other, slice(None), self._columns(other, self._maps)), starts)
         part, end = None, lin.nodes.size
         for at in instants[::-1]:
             first = int(np.searchsorted(lin.nodes, at / run.grid.step))
-            here = self._rows(index, slice(first, end), maps)
+            here = self._rows(index, slice(first, end), columns)
             part, end = here if part is None else part + here, first
             there = Stretch(run.recording.name, run.offset + float(at))
-            yield from self._told(part, (there,), starts, self._charge_within)
+            yield _Restricted((there,), part, index, self._charge_within)
             if later:
-                stretches = (there, *map(Stretch, later))
-                yield from self._told(part + rest, stretches, starts, self._charge_within)
+                yield _Restricted((there, *map(Stretch, later)), part + rest, index, self._charge_within)
 
     def _later(self, names: Sequence[str], starts: int) -> _Part:
-        size = self._maps.shape[1]
-        none = _Part(np.zeros((int(self._places[-1]), size)), np.zeros(size))
-        return self._wider(sum((self._whole[n] for n in names), none), starts)
+        return self._wider(sum((self._whole[n] for n in names), self._nothing(self._maps.shape[1])), starts)
 
     def _wider(self, part: _Part, starts: int) -> _Part:
         """Sums beside which a run's start is asked for, which shows in none of these rows."""
-        cross = np.concatenate([part.cross, np.zeros((part.cross.shape[0], starts))], axis=1)
-        return _Part(cross, np.concatenate([part.right, np.zeros(starts)]))
+        size = part.right.size
+        wide = self._nothing(size + starts)
+        wide.cross[:, :size], wide.right[:size], wide.gram[:size, :size] = part.cross, part.right, part.gram
+        for own, zeros in zip(wide.zeros, part.zeros, strict=True):
+            own[:, :size] = zeros
+        return wide
 
-    def _told(
-        self, part: _Part, stretches: tuple[Stretch, ...], starts: int | None, charge: float
-    ) -> Iterator[_Told]:
-        """Every group whose rows ``part`` sums. starts: columns of a start of its own, after the groups'."""
+    def _told(self, restricted: _Restricted) -> Iterator[_Told]:
+        """Every group by itself in the same stretches."""
         size = self._maps.shape[1]
+        part = restricted.part
         columns = self._beyond.of_sums(part.cross, part.right)
         gradient = columns.right
-        information = self._inner(part, stretches, starts) - columns.seen.T @ columns.solved
-        if starts:
+        information = self._inner(restricted, restricted, size) - columns.seen.T @ columns.solved
+        if restricted.run is not None:
             own = definite(information[size:, size:] + 1e-9 * np.diag(np.diag(information)[size:]))
             across = np.linalg.solve(own, information[size:, :size])
             gradient = gradient[:size] - across.T @ gradient[size:]
             information = information[:size, :size] - information[:size, size:] @ across
         for group, own in enumerate(self._of):
-            inside = information[np.ix_(own, own)] + np.eye(own.size)
-            values, vectors = np.linalg.eigh(0.5 * (inside + inside.T))
-            values = np.maximum(values, 1.0)
-            pull = vectors.T @ gradient[own]
-            net = 0.5 * float(np.sum(pull**2 / values) - np.sum(np.log(values))) - float(charge)
-            yield _Told(group, stretches, net)
+            net = _gained(information[np.ix_(own, own)], gradient[own]) - restricted.charge
+            yield _Told(group, restricted.stretches, net)
 
-    def _inner(self, part: _Part, stretches: tuple[Stretch, ...], starts: int | None) -> Array:
-        """(q, q) information of the restricted columns with one another: both are the same rows'."""
-        own: Array = self._maps.T @ part.cross[: self._size]
-        if not starts:
-            return own
-        # The start's columns show in one run's rows alone, where ``part`` has them as unknowns as well
-        there = stretches[0]
-        index = next(i for i, run in enumerate(self._problem.runs) if _holds(run, there))
-        first, last = self._places[index], self._places[index + 1]
-        return np.concatenate([own, part.cross[first:last]], axis=0)
+    def _net(self, restricted: _Restricted, group: int, known: Sequence[_Restricted]) -> _Told:
+        """One group in some stretches, beside steps of it that are ``known``."""
+        own, size = self._of[group], self._maps.shape[1]
+        every = [r.cut_to(own, size) for r in (*known, restricted)]
+        columns = [self._beyond.of_sums(r.part.cross, r.part.right) for r in every]
+        ends = np.cumsum([r.part.right.size for r in every])
+        at = [slice(end - r.part.right.size, end) for end, r in zip(ends, every, strict=True)]
+        F = np.zeros((ends[-1], ends[-1]))
+        for i, one in enumerate(every):
+            for j, two in enumerate(every):
+                F[at[i], at[j]] = self._inner(one, two, own.size) - columns[i].seen.T @ columns[j].solved
+        gradient = np.concatenate([c.right for c in columns])
+        prior = np.concatenate([np.arange(r.part.right.size) < own.size for r in every])
+        F += np.diag(np.where(prior, 1.0, 1e-9 * np.diag(F)))
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(F), 1e-300))
+        unit, pull = F * np.outer(scale, scale), gradient * scale
+        asked = np.arange(at[-1].start, at[-1].start + own.size)
+        others = np.setdiff1d(np.arange(F.shape[0]), asked)
+        left = unit[np.ix_(asked, asked)]
+        if others.size:
+            across = np.linalg.solve(definite(unit[np.ix_(others, others)]), unit[np.ix_(others, asked)])
+            left = left - unit[np.ix_(asked, others)] @ across
+            pull = np.concatenate([pull[others], pull[asked] - across.T @ pull[others]])
+        information = left / np.outer(scale[asked], scale[asked]) - np.eye(own.size)
+        net = _gained(information, pull[-own.size :] / scale[asked]) - restricted.charge
+        return _Told(group, restricted.stretches, net)
+
+    def _inner(self, one: _Restricted, two: _Restricted, count: int) -> Array:
+        """(q, p) information that columns have in common. count: of numbers, which stand before the start's.
+
+        They have the rows of the later of the two in common, where a start's columns are those of its run.
+        """
+        if self._time(one.stretches) > self._time(two.stretches):
+            return np.asarray(self._inner(two, one, count).T)
+        together = np.zeros((one.part.right.size, two.part.right.size))
+        shown = one.part.right.size if one.run == two.run else count
+        together[:shown] = two.part.gram[:shown]
+        for run, own, other in zip(self._full.runs, one.part.zeros, two.part.zeros, strict=True):
+            together -= own.T @ run.wander.taken @ other
+        return together
 
 
-def _within(stretches: tuple[Stretch, ...]) -> Stretch | None:
-    """The one that begins within its recording."""
-    return next((s for s in stretches if s.start > 0.0), None)
+def _gained(information: Array, gradient: Array) -> float:
+    """Log evidence that columns in units of their priors add."""
+    inside = information + np.eye(gradient.size)
+    values, vectors = np.linalg.eigh(0.5 * (inside + inside.T))
+    values = np.maximum(values, 1.0)
+    pull = vectors.T @ gradient
+    return 0.5 * float(np.sum(pull**2 / values) - np.sum(np.log(values)))
 
 
 def _holds(run: Run, stretch: Stretch) -> bool:
     """Whether a stretch begins within a run."""
     begins = stretch.start - run.offset
     return run.recording.name == stretch.recording and 0.0 < begins < run.grid.duration
-
-
-def _changed(group: Group, stretches: tuple[Stretch, ...], durations: Mapping[str, float]) -> Candidate:
-    """The hypothesis that a group's numbers are other ones in some stretches."""
-    mark = _mark(stretches)
-    own = tuple(
-        replace(
-            p,
-            name=f"{p.name}@{mark}",
-            nominal=0.0,
-            index=-1,
-            also=(),
-            bounded=False,
-            freed=False,
-            shifts=p.shifts or tuple((entry, 1.0) for entry in p.written),
-            during=stretches,
-        )
-        for p in group.numbers
-    )
-    times: list[dict[str, object]] = [
-        {"recording": s.recording, "start": round(s.start, 2), "end": round(durations[s.recording], 2)}
-        for s in stretches
-    ]
-    since = _since(stretches)
-    if group.of is None:
-        return _load(own, since, times)
-    base = group.of
-
-    def told(found: Estimates) -> Told:
-        index = [list(found.values).index(p.name) for p in own]
-        values = {p.name: p.nominal + found.values[q.name] for p, q in zip(base.parameters, own, strict=True)}
-        return base.told(Estimates(values, found.covariance[np.ix_(index, index)]))
-
-    return Candidate(
-        base.effect,
-        own,
-        f"{since}: {_in_a_sentence(base.sentence)}",
-        f"Find out what was touched or came loose then. {base.advice}",
-        {**base.where, "times": times},
-        tell=told,
-    )
-
-
-def _mark(stretches: tuple[Stretch, ...]) -> str:
-    """What tells a changed number's name from that of the number."""
-    first = stretches[0]
-    since = f"{first.recording}+{first.start:.2f}" if first.start > 0.0 else first.recording
-    return f"{since}({len(stretches)})"
-
-
-def _since(stretches: tuple[Stretch, ...]) -> str:
-    """When a number is another one, as the beginning of a sentence."""
-    first = stretches[0]
-    if first.start > 0.0:
-        later = "" if len(stretches) == 1 else " and in what was recorded later"
-        return f"From {first.start:.1f} s of {first.recording} on{later}"
-    return f"In {', '.join(s.recording for s in stretches)}, unlike before"
-
-
-def _in_a_sentence(text: str) -> str:
-    """A sentence as it stands after a colon."""
-    first = text.split(" ", 1)[0]
-    return text[0].lower() + text[1:] if first in ("The", "All", "Every") else text
-
-
-def _load(own: tuple[Parameter, ...], since: str, times: list[dict[str, object]]) -> Candidate:
-    """Something is put on the body, taken off it, or moved on it."""
-    names = [p.name for p in own]
-
-    def place(axis: int, *numbers: float) -> float:
-        return numbers[1 + axis] / numbers[0]
-
-    def told(found: Estimates) -> Told:
-        out: Told = {"mass": (*found.of(names[0]), "kg")}
-        for name, a in zip(names[1:4], AXES, strict=True):
-            out[f"first_moment_{a}"] = (*found.of(name), "kg*m")
-        if abs(found.values[names[0]]) > 3.0 * found.std(names[0]):
-            for i, a in enumerate(AXES):
-                out[f"position_{a}"] = (*found.following(lambda *v, i=i: place(i, *v), *names[:4]), "m")
-        return out
-
-    return Candidate(
-        "unknown",
-        own,
-        f"{since}: the body is heavier by {{value}} than before, and its first moment of mass is other, "
-        "by {told[first_moment_x]}, {told[first_moment_y]} and {told[first_moment_z]} along x, y and z. "
-        "A load was put on, taken off, or has moved.",
-        "Fasten what lies on it, and record everything with the same load.",
-        {"channel": None, "axis": None, "law": "changed load", "times": times},
-        tell=told,
-    )

@@ -22,7 +22,8 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.changes import Change, likeliest_changes, recordings_of
+from rig_identification.mismatch.change import Change
+from rig_identification.mismatch.changes import changeable, likeliest_changes, recordings_of
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, trace_of
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
@@ -149,7 +150,7 @@ def _simpler(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
     problem, evaluation = best.fitted.problem, best.fitted.evaluation
     parameters = problem.bench.parameters
     own = [parameters.index_of(p.name) for p in best.candidate.parameters]
-    others = best.change.with_fewer(catalogue(problem))
+    others = best.change.with_fewer([c for c in catalogue(problem) if changeable(c)])
     if best.own or not others or judged(best.fitted)[1].verdict != "none":
         return best
     wide = adding(problem, [c.candidate for c in others])
@@ -237,11 +238,10 @@ def _with_change(found: Explained, ideal: Ideal, change: Changed) -> Explained:
 
 
 def _cut(runs: tuple[Run, ...], change: Change) -> tuple[Run, ...]:
-    """Runs in parts before and after the instant of a change."""
-    there = change.within
-    if there is None:
-        return runs
-    return all_without(runs, Event(there.recording, there.start - ABOUT, there.start + ABOUT))
+    """Runs in parts before and after every instant of a change."""
+    for there in change.within:
+        runs = all_without(runs, Event(there.recording, there.start - ABOUT, there.start + ABOUT))
+    return runs
 
 
 def _told_by_held_runs(fitted: Fitted, change: Change) -> tuple[Candidate, bool]:

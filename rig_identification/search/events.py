@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fitted_again, judged, near_noise
-from rig_identification.estimate.solve import excess
+from rig_identification.estimate.launch import launch_state
+from rig_identification.estimate.solve import Point, excess
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
 from rig_identification.mismatch.latent import MissingWrench
 from rig_identification.mismatch.pulse import Pulse, likeliest_pulse, pulse_finding
 from rig_identification.mismatch.unknown import push_finding
 from rig_identification.result import Finding, Mismatch
-from rig_identification.search.ladder import Rung
+from rig_identification.search.ladder import Rung, fitted_at
+from rig_identification.search.levels import ALONE
 from rig_identification.search.unexplained import missing_wrenches
 
 Array = NDArray[np.float64]
@@ -143,7 +145,10 @@ def explained_outside(
         # A fit lost its way without what was found
         return replace(found, fitted=whole) if found.told else None
     after = judged(found.fitted)[0].holdout
-    pulse = event.inside(likeliest_pulse(whole)) or event.pulse
+    # A pulse is right to first order, which is near the noise
+    pulse = (event.inside(likeliest_pulse(whole)) if near_noise(whole) else None) or event.pulse
+    if pulse is None:
+        event = replace(event, missing=_course(found.fitted, whole, event.recording) or event.missing)
     gain = float(wrong(ideal.fitted) - wrong(found.fitted)) if pulse is None else pulse.gain
     evidence = {**evidence_of(ideal, found.fitted, after), "log_likelihood_gain": gain}
     push = replace(_told(event, pulse, ideal), evidence=evidence)
@@ -168,6 +173,20 @@ def _everything(found: Explained, ideal: Ideal) -> Fitted:
     outside = found.fitted
     whole = replace(outside.problem, runs=ideal.fitted.problem.runs)
     return fit_whole(ideal.fitted, whole, outside.problem, outside.evaluation.point)
+
+
+def _course(outside: Fitted, whole: Fitted, recording: str) -> MissingWrench | None:
+    """What acts in a recording over time, with rig and body as the rest of the session has them.
+
+    The wrench is as strong as its evidence asks for. None where no level can be followed.
+    """
+    run = next(r for r in (*whole.problem.runs, *whole.holdout_runs) if r.recording.name == recording)
+    theta = outside.evaluation.point.theta
+    problem = replace(outside.problem, runs=(run,), rests=())
+    start = launch_state(problem.bench, run, theta, outside.rest)
+    levels = (fitted_at(problem, Point(theta, (start,), ()), level, 0) for level in range(ALONE))
+    best = max((r for r in levels if r is not None), key=lambda rung: rung.evidence, default=None)
+    return None if best is None else missing_wrenches(best)[0]
 
 
 def wrong(fitted: Fitted) -> float:
