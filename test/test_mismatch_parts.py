@@ -92,7 +92,7 @@ def test_a_push_is_found_with_its_force_time_and_line() -> None:
 def test_a_push_is_told_as_a_force_from_outside() -> None:
     t, rig = 0.01 * np.arange(2000), thesis_case_14().rig
     size = np.where((t > 8.0) & (t < 9.0), 120.0 * np.sin(np.pi * (t - 8.0)), 0.0)
-    found = push_finding(swinging(np.outer(size, [0.0, 1.0, 0.0]), motion()), rig)
+    found = push_finding(swinging(np.outer(size, [0.0, 1.0, 0.0]), motion()), rig, 7.5, 9.5)
     assert found.effect == "external_force"
     (times,) = found.where["times"]  # type: ignore[misc]
     assert times["recording"] == "run_1"

@@ -45,6 +45,24 @@ def test_a_gentle_push_is_found_in_a_fitted_run_and_in_one_held_out(pushed: str)
     assert found.holdout_error < 1.1
 
 
+@pytest.mark.long
+def test_two_strong_pushes_are_told_with_their_own_times_and_forces() -> None:
+    session = _session("run_1", 300.0)
+    twice = tuple(moved(r, 200.0, 14.0, 1.0) if r.name == "run_1" else r for r in session.recordings)
+    found = identify(replace(session, recordings=twice))
+    assert found.mismatch.verdict == "explained"
+    pushes = [f for f in found.mismatch.findings if f.effect == "external_force"]
+    assert len(pushes) == 2
+    for push, start, end, size in zip(
+        pushes, (START, 14.0), (START + LASTS, 15.0), (300.0, 200.0), strict=True
+    ):
+        (times,) = push.where["times"]  # type: ignore[misc]
+        assert times["start"] == pytest.approx(start, abs=0.2)
+        assert times["end"] == pytest.approx(end, abs=0.2)
+        peak = np.linalg.norm([push.parameters[f"peak_force_{a}"]["value"] for a in "xyz"])
+        assert peak == pytest.approx(size, rel=0.1)
+
+
 def test_noise_alone_holds_no_push() -> None:
     fitted = fit_session(_session(None))
     assert Ideal(fitted, *judged(fitted)).mismatch.verdict == "none"

@@ -12,24 +12,27 @@ from rig_identification.estimate.identify import fit_session
 from rig_identification.mismatch.latent import MissingWrench
 from rig_identification.mismatch.pulse import Pulse
 from rig_identification.search import events
-from rig_identification.search.events import BIN, MARGIN, Event, _stretch, all_without, standing_out
+from rig_identification.search.events import BIN, MARGIN, Event, _stretches, all_without, standing_out
 
 
 def test_what_stands_out_for_a_while() -> None:
     rng = np.random.default_rng(2)
     squares = rng.chisquare(6, size=100) / 6.0
-    assert _stretch(squares) is None
+    assert _stretches(squares) == []
     squares[40:44] = [30.0, 90.0, 100.0, 25.0]
-    assert _stretch(squares) == (40, 44)
+    assert _stretches(squares) == [(40, 44)]
     # It comes again
     squares[70] = 60.0
-    assert _stretch(squares) is None
+    assert _stretches(squares) == [(40, 44), (70, 71)]
+    # ... and again
+    squares[[10, 20, 30, 55, 85]] = 60.0
+    assert _stretches(squares) == []
     # It dies away slowly
-    assert _stretch(np.exp(-np.arange(100) / 20.0)) is None
+    assert _stretches(np.exp(-np.arange(100) / 20.0)) == []
     # A constant beside it, in one piece alone, is less
     squares = np.where(np.arange(100) < 16, 4.0, 0.1)
     squares[50:53] = 100.0
-    assert _stretch(squares) == (50, 53)
+    assert _stretches(squares) == [(50, 53)]
 
 
 def test_a_push_leaves_other_stretches_of_its_recording_alone() -> None:
@@ -83,11 +86,11 @@ def test_a_push_stands_out_of_the_wrench(
     monkeypatch.setattr(events, "missing_wrenches", lambda rung: every)
     problem = SimpleNamespace(discrepancy=SimpleNamespace(covariance=np.diag([10.0] * 3 + [10.0] * 3)))
     found = standing_out(SimpleNamespace(alone=False, problem=problem))  # type: ignore[arg-type]
-    assert (found is not None) is there
-    if found is not None:
-        assert found.recording == "run_2"
-        assert start - 3.0 * BIN < found.start < start
-        assert start + lasts < found.end < start + lasts + 3.0 * BIN + 0.01
-        assert found.missing is every[1]
+    assert len(found) == there
+    for event in found:
+        assert event.recording == "run_2"
+        assert start - 3.0 * BIN < event.start < start
+        assert start + lasts < event.end < start + lasts + 3.0 * BIN + 0.01
+        assert event.missing is every[1]
     # Where no wrench is asked for there is nothing to see
-    assert standing_out(SimpleNamespace(alone=True, problem=problem)) is None  # type: ignore[arg-type]
+    assert standing_out(SimpleNamespace(alone=True, problem=problem)) == ()  # type: ignore[arg-type]

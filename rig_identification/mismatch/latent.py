@@ -55,12 +55,14 @@ EDGE = 0.15
 NARROW, TINY = 1e-3**0.5, 1e-30
 
 
-def strongest_push(missing: MissingWrench, middle: Array) -> Push:
-    """Where the missing force peaks, and how long it lasts about there."""
+def strongest_push(
+    missing: MissingWrench, middle: Array, start: float = -np.inf, end: float = np.inf
+) -> Push:
+    """Where the missing force peaks from ``start`` to ``end`` (s), and how long it lasts about there."""
     force = np.einsum("nij,nj->ni", missing.R_world_body, missing.wrench[:, :3])
     force = force - np.median(force, axis=0)
     size = np.linalg.norm(force, axis=1)
-    k = int(np.argmax(size))
+    k = int(np.argmax(np.where((missing.time >= start) & (missing.time <= end), size, -1.0)))
     a = b = k
     while a > 0 and size[a - 1] > EDGE * size[k]:
         a -= 1

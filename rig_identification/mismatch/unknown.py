@@ -23,9 +23,9 @@ SMEARED = 0.02
 ONE_FORCE = 0.95
 
 
-def push_finding(missing: MissingWrench, rig: Rig) -> Finding:
-    """The strongest course of a missing wrench as an external force, without evidence."""
-    push = strongest_push(missing, middle_of(rig))
+def push_finding(missing: MissingWrench, rig: Rig, start: float, end: float) -> Finding:
+    """The strongest course of a missing wrench from ``start`` to ``end`` (s) as a force, without evidence."""
+    push = strongest_push(missing, middle_of(rig), start, end)
     stds = np.full(3, np.hypot(push.std, SMEARED * push.size))
     return pushed(missing.recording, push.start, push.end, push.peak, stds, push.point)
 

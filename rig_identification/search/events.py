@@ -1,7 +1,8 @@
-"""Something that acts for seconds and is gone: found in the wrench's course, and left out of the fit.
+"""What acts for seconds and is gone: found in the wrench's course, and left out of the fit.
 
-What is wrong all the time is in the wrench all the time. What pushes for a second is in it for that second.
-Near the noise no wrench is asked for, and the push that whole runs show most of (mismatch/pulse.py) is told.
+What is wrong all the time is in the wrench all the time. What pushes for a second is in it for that second,
+once or a few times. Near the noise no wrench is asked for, and the push that whole runs show most of
+(mismatch/pulse.py) is told.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ OUTSIDE = 0.5
 SEEN = 0.25
 #: Seconds over which the wrench is averaged.
 BIN = 0.25
-#: A push stands out of the wrench at all other times by this factor (of its square), in one stretch of so
-#: much of the time at most: what swings, rubs or lags comes to as much again and again.
-STANDS_OUT, FOR = 5.0, 0.2
+#: Pushes stand out of the wrench at all other times by this factor (of its square), in so much of the time
+#: and so many stretches at most: what swings, rubs or lags comes to as much again and again.
+STANDS_OUT, FOR, SEVERAL = 5.0, 0.2, 3
 #: Bins on either side of what stands out in which it may begin and end.
 ABOUT = 2
 
@@ -62,8 +63,8 @@ class Event:
         return pulse if pulse is not None and pulse.within(self.recording, self.start, self.end) else None
 
 
-def event_of(ideal: Ideal, first: Rung) -> Event | None:
-    """The event that is chief of what the ideal model leaves; None where there is none.
+def events_of(ideal: Ideal, first: Rung) -> tuple[Event, ...]:
+    """The events that are chief of what the ideal model leaves; empty where there are none.
 
     first: that model at its own level.
     """
@@ -71,27 +72,27 @@ def event_of(ideal: Ideal, first: Rung) -> Event | None:
     if near_noise(fitted):
         pulse = likeliest_pulse(fitted)
         chief = pulse is not None and pulse.net > (1.0 - OUTSIDE) * wrong(fitted)
-        return _of_pulse(pulse) if pulse is not None and chief else None
+        return _of_pulse(pulse) if pulse is not None and chief else ()
     return standing_out(first)
 
 
-def event_beside(found: Explained) -> Event | None:
-    """The event that a fit with something in its model shows in whole runs; None where there is none."""
+def events_beside(found: Explained) -> tuple[Event, ...]:
+    """The event that a fit with something in its model shows in whole runs; empty where there is none."""
     if not near_noise(found.fitted):
-        return None
+        return ()
     pulse = likeliest_pulse(found.fitted)
     shows = pulse is not None and pulse.net > SEEN * wrong(found.fitted)
-    return _of_pulse(pulse) if pulse is not None and shows else None
+    return _of_pulse(pulse) if pulse is not None and shows else ()
 
 
-def _of_pulse(pulse: Pulse) -> Event:
-    return Event(pulse.recording, pulse.start, pulse.end, pulse)
+def _of_pulse(pulse: Pulse) -> tuple[Event, ...]:
+    return (Event(pulse.recording, pulse.start, pulse.end, pulse),)
 
 
-def standing_out(rung: Rung) -> Event | None:
-    """The one stretch in which the wrench of a model stands out of its wrench at all other times, or None."""
+def standing_out(rung: Rung) -> tuple[Event, ...]:
+    """The stretches in which the wrench of a model stands out of its wrench at all other times."""
     if rung.alone or rung.problem.discrepancy is None:
-        return None
+        return ()
     size = np.sqrt(np.diag(rung.problem.discrepancy.covariance))
     every = missing_wrenches(rung)
     rows, place = [], []
@@ -102,35 +103,39 @@ def standing_out(rung: Rung) -> Event | None:
             rows.append(np.mean(wrench, axis=0) / size)
             place.append((missing, float(time[0]), float(time[-1])))
     wrench = np.array(rows)
-    stretch = _stretch(np.sum((wrench - np.median(wrench, axis=0)) ** 2, axis=1))
-    if stretch is None:
-        return None
-    first, last = stretch[0] - ABOUT, stretch[1] + ABOUT
-    if first < 0 or last > len(place) or place[first][0] is not place[last - 1][0]:
-        # What begins or dies away stands out at a recording's end as well
-        return None
-    missing = place[first][0]
-    return Event(missing.recording, place[first][1], place[last - 1][2], None, missing)
+    out = []
+    for begin, end in _stretches(np.sum((wrench - np.median(wrench, axis=0)) ** 2, axis=1)):
+        first, last = begin - ABOUT, end + ABOUT
+        if first < 0 or last > len(place) or place[first][0] is not place[last - 1][0]:
+            # What begins or dies away stands out at a recording's end as well
+            return ()
+        missing = place[first][0]
+        out.append(Event(missing.recording, place[first][1], place[last - 1][2], None, missing))
+    return tuple(out)
 
 
-def _stretch(squares: Array) -> tuple[int, int] | None:
-    """First bin, and the one after the last, of the one stretch that stands out; None where none does."""
+def _stretches(squares: Array) -> list[tuple[int, int]]:
+    """First bin, and the one after the last, of each stretch that stands out; empty where too much does."""
     high = np.flatnonzero(squares > np.max(squares) / STANDS_OUT)
-    first, last = int(high[0]), int(high[-1]) + 1
-    return (first, last) if last - first <= FOR * squares.size else None
+    parts = np.split(high, np.flatnonzero(np.diff(high) > 2 * ABOUT) + 1)
+    found = [(int(part[0]), int(part[-1]) + 1) for part in parts]
+    lasting = sum(last - first for first, last in found)
+    return found if len(found) <= SEVERAL and lasting <= FOR * squares.size else []
 
 
 def explained_outside(
-    ideal: Ideal, event: Event, explain: Explain, notify: Notify, *, chief: bool
+    ideal: Ideal, events: tuple[Event, ...], explain: Explain, notify: Notify, *, chief: bool
 ) -> Explained | None:
-    """What explains the session outside of an event, and the event; None where something is left there.
+    """What explains the session outside of some events, and these; None where something is left there.
 
-    chief: the event has the larger part of what is wrong, and comes first; otherwise it comes last.
+    chief: the events have the larger part of what is wrong, and come first; otherwise they come last.
     """
-    notify(f"search: {event.recording} without a push at {event.start:.1f} s", 0.1)
+    times = " and ".join(f"{e.start:.1f} s of {e.recording}" for e in events)
+    notify(f"search: without a push at {times}", 0.1)
     fitted = ideal.fitted
-    runs = all_without(fitted.problem.runs, event)
-    held = all_without(fitted.holdout_runs, event)
+    runs, held = fitted.problem.runs, fitted.holdout_runs
+    for event in events:
+        runs, held = all_without(runs, event), all_without(held, event)
     if not runs:
         return None
     again = fitted_again(ideal, runs, (*held, *fitted.lost), notify)
@@ -145,27 +150,32 @@ def explained_outside(
         # A fit lost its way without what was found
         return replace(found, fitted=whole) if found.told else None
     after = judged(found.fitted)[0].holdout
-    # A pulse is right to first order, which is near the noise
-    pulse = (event.inside(likeliest_pulse(whole)) if near_noise(whole) else None) or event.pulse
-    if pulse is None:
-        event = replace(event, missing=_course(found.fitted, whole, event.recording) or event.missing)
-    gain = float(wrong(ideal.fitted) - wrong(found.fitted)) if pulse is None else pulse.gain
-    evidence = {**evidence_of(ideal, found.fitted, after), "log_likelihood_gain": gain}
-    push = replace(_told(event, pulse, ideal), evidence=evidence)
-    findings = (push, *found.mismatch.findings) if chief else (*found.mismatch.findings, push)
-    text = f"Outside the push: {found.mismatch.explanation} {held_out_errors(ideal.scores.holdout, after)}"
+    evidence = evidence_of(ideal, found.fitted, after)
+    gain = float(wrong(ideal.fitted) - wrong(found.fitted))
+    pulse = likeliest_pulse(whole) if near_noise(whole) else None
+    pushes = tuple(
+        _told(event, found.fitted, whole, pulse, {**evidence, "log_likelihood_gain": gain})
+        for event in events
+    )
+    findings = (*pushes, *found.mismatch.findings) if chief else (*found.mismatch.findings, *pushes)
+    outside = "the push" if len(events) == 1 else "the pushes"
+    text = f"Outside {outside}: {found.mismatch.explanation} {held_out_errors(ideal.scores.holdout, after)}"
     alternatives = found.mismatch.alternatives if found.mismatch.findings else ()
     return replace(found, mismatch=Mismatch("explained", text, findings, alternatives), ideal=ideal)
 
 
-def _told(event: Event, pulse: Pulse | None, ideal: Ideal) -> Finding:
-    """The event as a finding without evidence: as whole runs show it, or else as the wrench does."""
-    if pulse is not None:
-        return pulse_finding(pulse)
-    missing = event.missing
+def _told(
+    event: Event, outside: Fitted, whole: Fitted, pulse: Pulse | None, evidence: dict[str, float | None]
+) -> Finding:
+    """The event as a finding: near the noise as the likeliest ``pulse``, else as the wrench over time."""
+    seen = event.inside(pulse) or event.pulse
+    if seen is not None:
+        return replace(pulse_finding(seen), evidence={**evidence, "log_likelihood_gain": seen.gain})
+    # A pulse is right to first order, which is near the noise
+    missing = _course(outside, whole, event) or event.missing
     if missing is None:
         raise AssertionError("an event was seen in a pulse or in a wrench")
-    return push_finding(missing, ideal.fitted.problem.bench.rig)
+    return replace(push_finding(missing, whole.problem.bench.rig, event.start, event.end), evidence=evidence)
 
 
 def _everything(found: Explained, ideal: Ideal) -> Fitted:
@@ -175,12 +185,12 @@ def _everything(found: Explained, ideal: Ideal) -> Fitted:
     return fit_whole(ideal.fitted, whole, outside.problem, outside.evaluation.point)
 
 
-def _course(outside: Fitted, whole: Fitted, recording: str) -> MissingWrench | None:
-    """What acts in a recording over time, with rig and body as the rest of the session has them.
+def _course(outside: Fitted, whole: Fitted, event: Event) -> MissingWrench | None:
+    """What acts about an event over time, with rig and body as the rest of the session has them.
 
     The wrench is as strong as its evidence asks for. None where no level can be followed.
     """
-    run = next(r for r in (*whole.problem.runs, *whole.holdout_runs) if r.recording.name == recording)
+    run = next(r for r in (*whole.problem.runs, *whole.holdout_runs) if r.recording.name == event.recording)
     theta = outside.evaluation.point.theta
     problem = replace(outside.problem, runs=(run,), rests=())
     start = launch_state(problem.bench, run, theta, outside.rest)

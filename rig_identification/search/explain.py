@@ -17,7 +17,7 @@ from rig_identification.mismatch.undecided import undecided
 from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.changed import Asked, changes_of, explained_changed
 from rig_identification.search.disagreeing import where_runs_disagree
-from rig_identification.search.events import event_beside, event_of, explained_outside, standing_out
+from rig_identification.search.events import events_beside, events_of, explained_outside, standing_out
 from rig_identification.search.expand import worthy
 from rig_identification.search.ladder import Rung
 from rig_identification.search.levels import ALONE
@@ -93,9 +93,9 @@ def _explain(
     watched = only_watched(ideal.fitted.problem)
     if not watched:
         seen(first)
-    event = None if watched else event_of(ideal, first)
-    if event is not None:
-        found = explained_outside(ideal, event, rest_explained, notify, chief=True)
+    events = () if watched else events_of(ideal, first)
+    if events:
+        found = explained_outside(ideal, events, rest_explained, notify, chief=True)
         if found is not None:
             return found
     asked = Asked([], False) if watched or budget.spent() else changes_of(ideal.fitted, first)
@@ -140,7 +140,7 @@ def _beside(
     """What explains the session outside of an event that shows with the likeliest effects in the model."""
     if budget.spent() or not outcome.likeliest.found:
         return None
-    event = None if outcome.partly is None else event_beside(outcome.partly)
-    if event is None and not outcome.likeliest.rung.alone:
-        event = standing_out(outcome.rung)
-    return None if event is None else explained_outside(ideal, event, rest_explained, notify, chief=False)
+    events = () if outcome.partly is None else events_beside(outcome.partly)
+    if not events and not outcome.likeliest.rung.alone:
+        events = standing_out(outcome.rung)
+    return explained_outside(ideal, events, rest_explained, notify, chief=False) if events else None
