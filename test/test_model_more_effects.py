@@ -64,6 +64,42 @@ def test_a_plate_takes_out_what_air_against_it_does() -> None:
     assert lost == pytest.approx(np.trapezoid(power, dx=0.0025), rel=1e-3)
 
 
+def test_carried_air_keeps_its_energy() -> None:
+    """With u^T D u / 2 of the air beside the body's own nothing is lost, whichever way either turns."""
+    sample, at, D = random_sample(3, 3), np.array([0.4, 0.9, -0.3]), np.array([150.0, 60.0, 400.0])
+    plain = sample.model()
+    state = moving(sample, plain, 3)
+    motion = simulate(having(plain, AIR_CARRIED=D, AIR_CARRIED_POINT=at), state, Input.none(801, 0.0025))
+    velocity = np.einsum("nji,nj->ni", motion.R_world_body, motion.states[:, 6:9])
+    u = velocity + np.cross(motion.states[:, 9:12], at)
+    kinetic, potential = kinetic_and_potential(plain, motion)
+    air = 0.5 * np.sum(D * u**2, axis=1)
+    assert np.ptp(air) > 0.05 * np.max(kinetic)
+    assert np.ptp(kinetic + potential + air) < 1e-6 * np.max(kinetic)
+
+
+def test_air_carried_all_ways_is_a_mass_without_weight() -> None:
+    """At the centre of mass, as much along each axis: as ``air_added_mass`` has it."""
+    sample = random_sample(3, 3)
+    plain = sample.model()
+    state = moving(sample, plain, 3)
+    inertial = plain.physics[layout.INERTIAL : layout.INERTIAL + 4]
+    both = having(plain, AIR_CARRIED=np.full(3, 30.0), AIR_CARRIED_POINT=inertial[1:] / inertial[0])
+    moved = [simulate(m, state, Input.none(201, 0.01)).states for m in (both, having(plain, ADDED_MASS=30.0))]
+    np.testing.assert_allclose(*moved, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_every_number_of_carried_air(seed: int) -> None:
+    sample = random_sample(seed, 3)
+    air = {"AIR_CARRIED": np.array([3.0, 12.0, 5.0]), "AIR_CARRIED_POINT": np.array([0.2, -0.3, 0.4])}
+    model = having(sample.model(rods=True), **air)
+    block = layout.effects_offset(model.cables)
+    entries = [block + getattr(place, name) + i for name in air for i in range(3)]
+    entries += [layout.INERTIAL + 4, layout.CABLES + layout.LENGTH]
+    check_physics(model, moving(sample, model, seed), drive_of(61, 0.01, seed), entries, 2e-5)
+
+
 @pytest.mark.parametrize("seed", [3, 7])
 def test_every_number_of_both(seed: int) -> None:
     sample = random_sample(seed, 3)

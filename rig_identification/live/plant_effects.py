@@ -91,6 +91,8 @@ class PlantEffects:
     spin: Array = field(default_factory=lambda: np.zeros(3))  # N m s, body: of what spins on the body
     turning_cube: float = 0.0  # N m
     air_added_mass: float = 0.0  # kg
+    air_carried: Array = field(default_factory=lambda: np.zeros(3))  # kg, along body axes
+    air_carried_point: Array = field(default_factory=lambda: np.zeros(3))  # m, body
     exciter_rotor: float = 0.0  # kg
     cable_mass: float = 0.0  # kg/m
     cable_torsion: float = 0.0  # N m/rad, each cable
@@ -152,6 +154,8 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.SPIN : block + place.SPIN + 3] = effects.spin
     physics[block + place.TURNING_CUBE] = effects.turning_cube
     physics[block + place.ADDED_MASS] = effects.air_added_mass
+    physics[block + place.AIR_CARRIED : block + place.AIR_CARRIED + 3] = effects.air_carried
+    physics[block + place.AIR_CARRIED_POINT : block + place.AIR_CARRIED_POINT + 3] = effects.air_carried_point
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
     physics[block + place.LINEAR_DENSITY] += effects.cable_mass
     physics[block + place.TORSION] = effects.cable_torsion

@@ -40,8 +40,13 @@ class Change:
     steps: tuple[
         tuple[Stretch, ...], ...
     ]  # of every step, the stretches in which it counts; the oldest first
-    net: float  # nats that it adds to the log evidence, to first order
+    nets: tuple[float, ...]  # nats that each step adds to the log evidence, to first order
     durations: Mapping[str, float]  # s, of every recording
+
+    @property
+    def net(self) -> float:
+        """Nats that all of it adds to the log evidence, to first order."""
+        return sum(self.nets)
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
@@ -56,7 +61,7 @@ class Change:
     @cached_property
     def candidate(self) -> Candidate:
         """The hypothesis."""
-        steps = self._told_steps
+        steps = self.told_steps
         own = [_own(self.group.numbers, step) for step in steps]
         since, times = _since(steps), _times(steps, self.durations)
         base = _load(self.group.numbers) if self.group.of is None else self.group.of
@@ -86,19 +91,27 @@ class Change:
         later = tuple(map(Stretch, recordings))
         return replace(self, steps=tuple((*step, *later) for step in self.steps), durations=durations)
 
+    def of_steps(self, kept: list[tuple[Stretch, ...]]) -> Change:
+        """The same with some of its ``told_steps`` alone."""
+        chosen = [i for i, step in enumerate(self.steps) if step in kept]
+        steps = tuple(self.steps[i] for i in chosen)
+        return replace(self, steps=steps, nets=tuple(self.nets[i] for i in chosen))
+
     def with_fewer(self, candidates: list[Candidate]) -> list[Change]:
         """Changes of fewer numbers in the same stretches. candidates: errors of numbers."""
         fewer = (c for c in candidates if len(c.parameters) < len(self.group.numbers))
         return [replace(self, group=Group(c.parameters, np.zeros((0, len(c.parameters))), c)) for c in fewer]
 
     @property
-    def _told_steps(self) -> tuple[tuple[Stretch, ...], ...]:
-        """Steps with numbers of their own."""
-        return tuple(
-            step
-            for before, step in zip((None, *self.steps), self.steps, strict=False)
-            if before is None or not _soon(before, step)
-        )
+    def told_steps(self) -> tuple[tuple[Stretch, ...], ...]:
+        """Steps with numbers of their own: of those that follow soon upon each other the likeliest."""
+        chains: list[list[int]] = []
+        for i, step in enumerate(self.steps):
+            if i and _soon(self.steps[i - 1], step):
+                chains[-1].append(i)
+            else:
+                chains.append([i])
+        return tuple(self.steps[max(chain, key=lambda i: self.nets[i])] for chain in chains)
 
 
 def within(stretches: tuple[Stretch, ...]) -> Stretch | None:

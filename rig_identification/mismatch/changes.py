@@ -73,9 +73,8 @@ def likeliest_changes(
     changes = []
     for t in ranked:
         steps = asked.stepped(max([t, *asked.near(t)], key=lambda told: told.net))
-        changes.append(
-            Change(groups[t.group], tuple(s.stretches for s in steps), sum(s.net for s in steps), durations)
-        )
+        stretches, nets = tuple(s.stretches for s in steps), tuple(s.net for s in steps)
+        changes.append(Change(groups[t.group], stretches, nets, durations))
     return sorted(changes, key=lambda change: -change.net), always
 
 

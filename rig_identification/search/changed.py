@@ -115,11 +115,11 @@ def explained_changed(
             best = found
         if wrong(best.fitted) > OUTSIDE * wrong(fitted):
             return None
-        if judged(best.fitted)[1].verdict == "none":
+        if _explains(best.fitted):
             break
     if best is None:
         return None
-    best = _simpler(fitted, best, notify)
+    best = _simpler(fitted, _of_fewer_steps(fitted, best, notify), notify)
     rest = Ideal(best.fitted, *judged(best.fitted))
     told = explain(rest) or Explained(rest.fitted, rest.mismatch, rest)
     if told.mismatch.verdict == "unexplained":
@@ -140,6 +140,41 @@ class Changed(NamedTuple):
     change: Change
 
 
+def _of_fewer_steps(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
+    """The same session without the steps that its fit does not see.
+
+    About a large step first order promises further ones. Fitted, with a of a step's numbers in units of their
+    priors and F what the fit tells of them with all else free, it adds a^T F a / 2 - log det F / 2 nats.
+    """
+    problem, evaluation = best.fitted.problem, best.fitted.evaluation
+    steps, parameters = best.change.told_steps, problem.bench.parameters
+    if best.own or len(steps) == 1:
+        return best
+    covariance = invert_information(evaluation.information)
+    nets = []
+    for own in np.split(
+        np.array([parameters.index_of(p.name) for p in best.candidate.parameters]), len(steps)
+    ):
+        F = np.linalg.inv(definite(covariance[np.ix_(own, own)]))
+        a = evaluation.point.theta[own]
+        nets.append(0.5 * float(a @ F @ a - np.linalg.slogdet(F)[1]))
+    kept = [step for step, net in zip(steps, nets, strict=True) if net > MEANT]
+    if not kept or len(kept) == len(steps):
+        return best
+    fewer = best.change.of_steps(kept)
+    again = _fitted_with(fitted, fewer, fewer.candidate, notify)
+    if again is None or wrong(again) > wrong(best.fitted) + LITTLE * wrong(fitted):
+        return best
+    if _explains(best.fitted) and not _explains(again):
+        return best
+    return Changed(again, fewer.candidate, best.own, fewer)
+
+
+def _explains(fitted: Fitted) -> bool:
+    """Whether nothing but noise is left."""
+    return judged(fitted)[1].verdict == "none"
+
+
 def _simpler(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
     """The same session with fewer numbers that change, where these explain as much.
 
@@ -151,7 +186,7 @@ def _simpler(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
     parameters = problem.bench.parameters
     own = [parameters.index_of(p.name) for p in best.candidate.parameters]
     others = best.change.with_fewer([c for c in catalogue(problem) if changeable(c)])
-    if best.own or not others or judged(best.fitted)[1].verdict != "none":
+    if best.own or not others or not _explains(best.fitted):
         return best
     wide = adding(problem, [c.candidate for c in others])
     full = evaluate(wide, carried(wide, problem, evaluation.point))
@@ -174,7 +209,7 @@ def _simpler(fitted: Fitted, best: Changed, notify: Notify) -> Changed:
     if costs[k] > ALIKE * float(a @ left[: len(own), : len(own)] @ a):
         return best
     again = _fitted_with(fitted, others[k], others[k].candidate, notify)
-    if again is None or judged(again)[1].verdict != "none":
+    if again is None or not _explains(again):
         return best
     return Changed(again, others[k].candidate, best.own, others[k])
 

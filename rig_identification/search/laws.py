@@ -11,6 +11,7 @@ from dataclasses import replace
 from rig_identification.estimate.solve import POLISH, Problem, solve
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.carried_air import CARRIED_NAME, CarriedAir
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.place_scan import Shape, best_places
 from rig_identification.mismatch.plates import AREA_NAME, PLATES
@@ -27,7 +28,9 @@ def promised_laws(rung: Rung, found: tuple[Candidate, ...]) -> list[Promise]:
     """
     laws = () if any(parts_of(c) for c in found) else LAWS
     taken = {q.name for q in rung.problem.bench.parameters.free}
-    shapes: tuple[Shape, ...] = (*laws, *(() if AREA_NAME in taken else PLATES))
+    plates = () if AREA_NAME in taken else PLATES
+    carried = () if f"{CARRIED_NAME}.x" in taken else (CarriedAir(),)
+    shapes: tuple[Shape, ...] = (*laws, *plates, *carried)
     mass = mass_of(rung.problem, rung.evaluation)
     return best_places(rung.problem, rung.evaluation, mass, shapes) if shapes else []
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from numba import njit
 
 from rig_identification.model.effects.air_added_mass import add_air_added_mass
+from rig_identification.model.effects.air_carried import add_air_carried
 from rig_identification.model.effects.air_drag import add_air_drag
 from rig_identification.model.effects.air_plate import add_air_plate
 from rig_identification.model.effects.air_plates import add_air_plates
@@ -25,6 +26,7 @@ from rig_identification.model.effects.internal import add_internal
 from rig_identification.model.effects.own import add_own, own_active
 from rig_identification.model.effects.place import (
     ADDED_MASS,
+    AIR_CARRIED,
     AIR_PLATE,
     BENDING,
     DAMPING,
@@ -135,6 +137,8 @@ def add_effects(physics, modes, x, R, K, r):  # type: ignore[no-untyped-def]
         add_turning_cube(physics, block, R, r)
     if active(physics[block + ADDED_MASS]):
         add_air_added_mass(physics, block, x, K, r)
+    if _any_active(physics, block + AIR_CARRIED, 3):
+        add_air_carried(physics, block, x, R, K, r)
     if active(physics[block + ROTOR_MASS]):
         add_exciter_rotor(physics, block, x, R, K, r)
     if active(physics[block + GYROSCOPIC_SHARE]):
