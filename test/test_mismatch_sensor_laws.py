@@ -21,6 +21,8 @@ BENT = 2e-6
 LEAKS, EVEN = 0.02, 3000.0
 #: rad/s per m/s^2: two degrees per second and g.
 FELT = 3e-3
+#: N on either branch, once the load has turned by twice the play, N.
+BEHIND, PLAY = 12.0, 40.0
 #: N/s at first, 1/s.
 WARMS, SETTLES = 0.4, 0.2
 
@@ -53,6 +55,16 @@ def _warming(recording: Recording) -> Recording:
     return replace(recording, tension={**recording.tension, "cable_1": replace(cell, values=values)})
 
 
+def _behind(recording: Recording) -> Recording:
+    """Within its play a cell stays where it is; beyond it follows the load."""
+    cell = recording.tension["cable_3"]
+    values, held = cell.values.copy(), float(cell.values[0, 0])
+    for k, load in enumerate(cell.values[:, 0]):
+        held = min(max(held, load - PLAY), load + PLAY)
+        values[k] += BEHIND / PLAY * (held - load)
+    return replace(recording, tension={**recording.tension, "cable_3": replace(cell, values=values)})
+
+
 class Law(NamedTuple):
     """What a device does, how it is told, and its amount."""
 
@@ -67,6 +79,7 @@ class Law(NamedTuple):
 LAWS = {
     "bent": Law(_bent, "cable_2", "tension", "curvature", BENT, "1/N"),
     "leaking": Law(_leaking, "cable_2", "tension", "sensitivity", LEAKS, "1"),
+    "behind": Law(_behind, "cable_3", "tension", "hysteresis", BEHIND, "N"),
     "felt": Law(_felt, "imu", "angular_rate", "sensitivity", FELT, "s/m"),
     "warming": Law(_warming, "cable_1", "tension", "settling_rate", SETTLES, "1/s"),
 }

@@ -26,7 +26,7 @@ def effect_of(name: str) -> str:
     """The contract's effect that a switch, or a device's error, belongs to."""
     first, _, rest = name.partition(".")
     kind = rest.partition(".")[0]
-    if {"feels", "drift", "load_cell_curve"} & set(rest.split(".")):
+    if {"feels", "drift", "load_cell_curve", "load_cell_hysteresis", "load_cell_play"} & set(rest.split(".")):
         # A law of a reading, which the contract's table has no word for
         return "unknown"
     if kind == "orientation":

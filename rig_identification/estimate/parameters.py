@@ -149,13 +149,16 @@ class DeviceLayout:
     def laws(self) -> dict[str, int]:
         """Entries, by name, of what a reading may follow beside gains and zeros (model/sensors.py).
 
-        ``cable_1.load_cell_curve``, ``cable_1.feels.cable_2``, ``imu.gyroscope.x.feels.accelerometer.y``, and
+        ``cable_1.load_cell_curve``, ``_hysteresis`` and ``_play``, ``cable_1.feels.cable_2``,
+        ``imu.gyroscope.x.feels.accelerometer.y``, and
         ``cable_1.drift``, ``imu.angular_rate.drift.x``, each with ``.settling``.
         """
         out: dict[str, int] = {}
         drifting = {c: [f"{c}.drift"] for c in self.cables}
         for cable in self.cables:
             out[f"{cable}.load_cell_curve"] = self.load_cell(cable) + devices.LOAD_CELL_CURVE
+            out[f"{cable}.load_cell_hysteresis"] = self.load_cell(cable) + devices.LOAD_CELL_HYSTERESIS
+            out[f"{cable}.load_cell_play"] = self.load_cell(cable) + devices.LOAD_CELL_PLAY
             for i, other in enumerate(self.cables):
                 if other != cable:
                     out[f"{cable}.feels.{other}"] = self.load_cell(cable) + devices.LOAD_CELL_OWN + i

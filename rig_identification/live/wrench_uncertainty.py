@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
-from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 

@@ -55,6 +55,7 @@ _EXPERIMENTS = {
     "unknown hold against rolling": "hang the body on single points, and repeat",
     "unknown turn that softens": "repeat with small turns alone, and with a plate of known size hung beside",
     "unknown torsion of the cables": "repeat with the body turned slowly, and with swivels in the cables",
+    "unknown hysteresis": "load that cell alone, rising and then falling through the same weights",
     "unknown curvature": "load that cell alone, with several known weights over its range",
     "unknown cross-sensitivity": "load one cell, or turn and tilt about one axis, alone: no other reads it",
     "unknown drift": "leave all at rest for as long as a recording takes: what drifts does so by itself",

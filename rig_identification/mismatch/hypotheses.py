@@ -15,6 +15,7 @@ from rig_identification.mismatch.bent_cells import bent_cells
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
 from rig_identification.mismatch.drifts import drifts
+from rig_identification.mismatch.lagging_cells import lagging_cells
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.mount_errors import mount_errors
@@ -38,6 +39,7 @@ def catalogue(problem: Problem) -> list[Candidate]:
     every = [
         *sensor_errors(rig, parameters, devices_of(problem)),
         *bent_cells(rig, parameters, mass),
+        *lagging_cells(rig, parameters, mass),
         *cross_sensitivity(rig, parameters, devices_of(problem)),
         *drifts(rig, parameters, devices_of(problem), longest(problem)),
         *rig_errors(rig, parameters),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -129,8 +130,9 @@ def drifting(reading: Reading, time: Array, device: Array) -> Reading:
     return Reading(reading.values + values, reading.in_raw, in_device)
 
 
-#: load_cell: gain error 1, zero N, curve 1/N; then the share of each cable's tension that it feels
-LOAD_CELL_CURVE, LOAD_CELL_OWN = 2, 3
+#: load_cell: gain error 1, zero N, curve 1/N, hysteresis N, play N; then the share of each cable's tension
+#: that it feels
+LOAD_CELL_CURVE, LOAD_CELL_HYSTERESIS, LOAD_CELL_PLAY, LOAD_CELL_OWN = 2, 3, 4, 5
 
 
 def load_cell_size(cables: int) -> int:
@@ -138,10 +140,32 @@ def load_cell_size(cables: int) -> int:
     return LOAD_CELL_OWN + cables
 
 
-def load_cell(raw: Array, cable: int, device: Array) -> Reading:
-    """Tension (1 + gain) T + zero + curve T^2 + sum of share_j T_j of one cable, N.
+@njit(cache=True)
+def branch(load, play):  # type: ignore[no-untyped-def]
+    """(N,) on which branch a device with play is, from -1 to 1, and its derivative in the play, per unit.
 
-    device (3 + n,): gain error, zero, curve, and shares of all cables, of which its own says nothing.
+    load (N,): what it bears over time. play: by how much the load has to turn for the other branch, half of
+    it; 0: it has none, and there are no branches. The stop operator (Krasnosel'skii and Pokrovskii, "Systems
+    with Hysteresis", 1989), between its branches at first.
+    """
+    values, slopes = np.zeros(load.size), np.zeros(load.size)
+    if play <= 0.0:
+        return values, slopes
+    for k in range(1, load.size):
+        step = (load[k] - load[k - 1]) / play
+        moved = values[k - 1] + step
+        values[k] = min(1.0, max(-1.0, moved))
+        if values[k] == moved:
+            slopes[k] = slopes[k - 1] - step / play
+    return values, slopes
+
+
+def load_cell(raw: Array, cable: int, device: Array) -> Reading:
+    """Tension (1 + gain) T + zero + curve T^2 - hysteresis s + sum of share_j T_j of one cable, N.
+
+    device (5 + n,): gain error, zero, curve, hysteresis, play, and shares of all cables, of which its own
+    says nothing. s (:func:`branch`): -1 where the load falls, 1 where it rises, and between them for a play
+    after it turned. Its slope in the tension is left out of the derivatives: it is a small share of one.
     curve: the first term of a bridge or an amplifier that is not straight. share: of what leaks over from
     another cell's channel, or of the load that reaches this one beside the cable.
     """
@@ -154,16 +178,21 @@ def load_cell(raw: Array, cable: int, device: Array) -> Reading:
     in_raw[:, 0, layout.OUT_TENSION :] = shares
     in_raw[:, 0, layout.OUT_TENSION + cable] = 1.0 + device[0] + 2.0 * device[2] * tension
 
+    lag, in_play = branch(np.ascontiguousarray(tension), float(device[LOAD_CELL_PLAY]))
+
     def in_device() -> Array:
         out = np.empty((nodes, 1, device.size))
         out[:, 0, 0] = tension
         out[:, 0, 1] = 1.0
-        out[:, 0, 2] = tension**2
+        out[:, 0, LOAD_CELL_CURVE] = tension**2
+        out[:, 0, LOAD_CELL_HYSTERESIS] = -lag
+        out[:, 0, LOAD_CELL_PLAY] = -device[LOAD_CELL_HYSTERESIS] * in_play
         out[:, 0, LOAD_CELL_OWN:] = tensions
         out[:, 0, LOAD_CELL_OWN + cable] = 0.0
         return out
 
     values = (1.0 + device[0] + device[2] * tension) * tension + device[1] + tensions @ shares
+    values = values - device[LOAD_CELL_HYSTERESIS] * lag
     return Reading(values[:, None], in_raw, in_device)
 
 

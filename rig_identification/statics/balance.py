@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
@@ -59,15 +60,6 @@ class Balance:
     residual: Array  # (..., n + 6)
     pose_slope: Array  # (..., n + 6, 6) in position (m, world) and rotation vector (rad, world)
     tension_slope: Array  # (..., n + 6, n) in tensions (weights)
-
-
-def skew(vectors: Array) -> Array:
-    """(..., 3, 3) matrices that multiply from the left as the cross product does."""
-    out = np.zeros((*vectors.shape, 3))
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
-    return out
 
 
 def balance(

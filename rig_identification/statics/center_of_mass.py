@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig_identification.errors import InputError
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
 from rig_identification.statics.adjustment import Adjusted, adjust
-from rig_identification.statics.balance import balance, skew, undetermined_tensions
+from rig_identification.statics.balance import balance, undetermined_tensions
 from rig_identification.statics.equilibrium import hanging_mass
 from rig_identification.statics.judgement import judge, misfit
 from rig_identification.statics.observation import StaticObservation, mount, up_in_body

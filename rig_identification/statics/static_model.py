@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
-from rig_identification.statics.balance import Suspension, balance, hinge_stiffness, skew, spans
+from rig_identification.statics.balance import Suspension, balance, hinge_stiffness, spans
 from rig_identification.statics.equilibrium import hanging_mass
 from rig_identification.statics.observation import StaticObservation, mount
 

@@ -24,8 +24,8 @@ from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import SCALE
 from rig_identification.check.consistency.trajectory import Trajectory, rotation
 from rig_identification.model.body import inertia_times
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
-from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from scipy.spatial.transform import Rotation
 from rig_identification.check.consistency.rest_model import BIAS, DOUBT, LENGTH, TILT
 from rig_identification.check.consistency.spline import Block
 from rig_identification.check.consistency.trajectory import Trajectory, cross, rotation
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Mount, Rig
-from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 #: Slopes by pose, velocity and acceleration.

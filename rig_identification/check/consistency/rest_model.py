@@ -18,9 +18,10 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.check.consistency.reduced import Reduced
 from rig_identification.check.consistency.trajectory import rotation
+from rig_identification.model.so3 import skew
 from rig_identification.recording import Dummy
 from rig_identification.rig import Rig
-from rig_identification.statics.balance import Suspension, balance, skew, spans
+from rig_identification.statics.balance import Suspension, balance, spans
 from rig_identification.statics.equilibrium import hanging_mass
 
 Array = NDArray[np.float64]

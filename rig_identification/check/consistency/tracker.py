@@ -23,8 +23,8 @@ from scipy.spatial.transform import Rotation
 from rig_identification.check.consistency.measured import ACROSS, FEWEST_POSES, ORDINARY, TINY, seen
 from rig_identification.check.consistency.motion import INDEPENDENT, nats
 from rig_identification.check.consistency.trajectory import Trajectory
+from rig_identification.model.so3 import skew
 from rig_identification.rig import Rig
-from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 

@@ -27,10 +27,9 @@ from rig_identification.check.consistency.rest import RestFit
 from rig_identification.check.consistency.rest_model import BIAS
 from rig_identification.check.consistency.trajectory import rotation
 from rig_identification.examination import SetupFault
-from rig_identification.model.so3 import nearest_rotation
+from rig_identification.model.so3 import nearest_rotation, skew
 from rig_identification.quantity import with_interval
 from rig_identification.rig import Mount, Rig
-from rig_identification.statics.balance import skew
 
 Array = NDArray[np.float64]
 
