@@ -73,9 +73,11 @@ def check(read: Callable[[Array, Array, Array], sensors.Reading], motion: Motion
 def test_load_cell(seed: int) -> None:
     motion = swing(seed)
     check(
-        lambda raw, R, d: sensors.load_cell(raw, 1, d), motion, np.array([0.01, 4.0, 2e-6, 0.02, 0.5, -0.03])
+        lambda raw, R, d: sensors.load_cell(raw, 1, d),
+        motion,
+        np.array([0.01, 4.0, 2e-6, 0.0, 30.0, 0.02, 0.5, -0.03]),
     )
-    reading = sensors.load_cell(motion.outputs, 2, np.array([0.02, -3.0, 1e-6, 0.0, 0.04, 0.7]))
+    reading = sensors.load_cell(motion.outputs, 2, np.array([0.02, -3.0, 1e-6, 0.0, 0.0, 0.0, 0.04, 0.7]))
     other, tension = motion.outputs[:, layout.OUT_TENSION + 1 :].T
     np.testing.assert_allclose(reading.values[:, 0], 1.02 * tension - 3.0 + 1e-6 * tension**2 + 0.04 * other)
 
@@ -146,6 +148,27 @@ def test_jacobians_of_the_rotation_group(size: float) -> None:
     right = log(base * Rotation.from_rotvec(d)) - log(base * Rotation.from_rotvec(-d))
     np.testing.assert_allclose(inverse_right_jacobian(phi[None])[0] @ d, right / 2.0, atol=1e-13)
     np.testing.assert_allclose(skew(phi) @ d, np.cross(phi, d), atol=1e-18)
+
+
+def test_a_cell_with_play_reads_behind_the_load_on_either_branch() -> None:
+    """A swing that turns by more than twice the play goes round a loop of the area 4 h (A - play)."""
+    time, amount, play, size = np.linspace(0.0, 3.0, 30001), 2.0, 25.0, 100.0
+    raw = np.zeros((time.size, layout.OUT_TENSION + 1))
+    raw[:, layout.OUT_TENSION] = load = 1000.0 + size * np.sin(2.0 * np.pi * time)
+    device = np.array([0.0, 0.0, 0.0, amount, play, 0.0])
+    reading = sensors.load_cell(raw, 0, device)
+    behind = reading.values[:, 0] - load
+    assert np.max(np.abs(behind)) == pytest.approx(amount)
+    loop = time > 2.0
+    area = np.trapezoid(behind[loop], load[loop])
+    assert area == pytest.approx(-4.0 * amount * (size - play), rel=1e-3)
+    numeric = slope(lambda d: sensors.load_cell(raw, 0, d).values, device)
+    # But where a branch is reached within the step of the difference
+    off = np.abs(reading.in_device - numeric)[:, 0, [3, 4]]
+    assert np.mean(np.max(off, axis=1) > 1e-6) < 1e-3
+    # What has no play has no branches
+    none = sensors.load_cell(raw, 0, np.array([0.0, 0.0, 0.0, amount, 0.0, 0.0]))
+    np.testing.assert_array_equal(none.values[:, 0], load)
 
 
 @pytest.mark.parametrize("settling", [0.0, 1e-6, 0.3, -0.05])
