@@ -111,6 +111,12 @@ def own_rig(folder: Path) -> None:
     simulated("SESSION")(folder)
 
 
+def certified(folder: Path) -> None:
+    """A session, and the page's own description of a laboratory."""
+    simulated("SESSION")(folder)
+    (folder / "lab.yaml").write_text(blocks(DOCS / "how-to" / "certificate.md", "yaml")[0], encoding="utf-8")
+
+
 def remembered(folder: Path) -> None:
     """Results of sessions on a rig, and one that is recorded today."""
     simulated("today", "monday")(folder)
@@ -141,7 +147,12 @@ CASES = (
     ),
     Case("docs/how-to/rig-memory.md", (1,), remembered, ("today_with_memory/result.json",)),
     Case("docs/how-to/fuse.md", (0,), simulated("high", "low"), ("both/result.json",)),
-    Case("docs/how-to/certificate.md", (0,), simulated("SESSION"), ("certified/certificate.pdf",)),
+    Case(
+        "docs/how-to/certificate.md",
+        (0, 1),
+        certified,
+        ("certified/certificate.pdf", "certified/certificate.xml"),
+    ),
     Case("docs/how-to/own-rig.md", (0, 1), own_rig, ("trial_answer/report.html", "ANSWER/report.html")),
     Case("docs/how-to/batch.md", (0,), simulated("sessions/a", "sessions/b"), ("results/a/result.json",)),
     Case("docs/how-to/plan.md", (0,), described, ("plan/plan.html", "plan/session.yaml")),
