@@ -1,4 +1,4 @@
-"""A report as PDF, as a browser prints it: no cell is lost, and no table's heads stand alone at a page's end."""
+"""A report as PDF, as a browser prints it: no cell is lost, no table's heads stand alone at a page's end."""
 
 from __future__ import annotations
 
