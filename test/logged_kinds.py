@@ -1,0 +1,287 @@
+"""What loggers write of ten kinds of rigs: the files that the pages of docs/recordings begin with.
+
+Each kind is a simulated session, written as its logger would write it, with its units and its columns.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
+from scipy.io import savemat
+from scipy.spatial.transform import Rotation
+
+import rig_identification as ri
+from rig_identification.recording import Recording, Series
+from rig_identification.rig import Cable, Mount, Rig
+
+Array = NDArray[np.float64]
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+#: A bar of 12 kg on two strings, and a plate of 42 kg on three: m, c, then Jxx Jxy Jxz Jyy Jyz Jzz.
+BAR = [12.0, 0.4, 0.0, -0.05, 0.09, 0.0, 0.0, 1.1, 0.0, 1.15]
+PLATE = [42.0, 0.3, 0.173, 0.02, 1.9, 0.0, 0.0, 2.4, 0.0, 3.6]
+#: An engine of 180 kg on four cables.
+ENGINE = [180.0, 0.42, 0.31, -0.35, 9.5, 0.4, -0.9, 14.2, 0.3, 12.1]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of recordings."""
+
+    page: str  # in docs/recordings
+    make: Callable[[], ri.Simulated]
+    write: Callable[[ri.Simulated, Path], None]
+    known: tuple[str, ...]  # elements that the page's commands determine
+    heads: str = ""  # first line of its text files
+
+
+def _hung(points: list[list[float]], length: float, mass: float, **devices: Any) -> Rig:
+    """A body on parallel strings that hang from straight above."""
+    cables = tuple(
+        Cable(f"string_{i + 1}", np.array(p) + np.array([0.0, 0.0, length]), np.array(p), length)
+        for i, p in enumerate(points)
+    )
+    return Rig(gravity=9.80665, cables=cables, mass=mass, mass_std=0.001 * mass, **devices)
+
+
+def bar(**devices: Any) -> Rig:
+    """On two strings of 1.5 m, 0.8 m apart."""
+    return _hung([[0.0, 0.0, 0.0], [0.8, 0.0, 0.0]], 1.5, 12.0, **devices)
+
+
+def plate(**devices: Any) -> Rig:
+    """On three strings of 2 m at the corners of a triangle with sides of 0.6 m."""
+    return _hung([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.3, 0.52, 0.0]], 2.0, 42.0, **devices)
+
+
+def engine(**devices: Any) -> Rig:
+    """On four cables that lean outwards."""
+    corners = ((0.0, 0.0), (0.9, 0.0), (0.0, 0.7), (0.9, 0.7))
+    cables = []
+    for i, (x, y) in enumerate(corners):
+        foot, head = np.array([x, y, 0.0]), np.array([x + 0.6 * (x - 0.45), y + 0.6 * (y - 0.35), 1.6])
+        cables.append(Cable(f"cable_{i + 1}", head, foot, round(float(np.linalg.norm(head - foot)), 4)))
+    return Rig(gravity=9.80665, cables=tuple(cables), mass=180.0, mass_std=0.1, **devices)
+
+
+def turned(rig: Rig, body: list[float], seed: int, **more: Any) -> ri.Simulated:
+    """Turned about the vertical and let go, twice."""
+    asked: dict[str, Any] = {"duration": 12.0, "rest": 0.0, "without": ["tension"]}
+    start = [0.0, 0.0, 0.0, 0.0, 0.0, 0.3]
+    return ri.simulate(rig, body=body, displaced=start, seed=seed, **{**asked, **more})
+
+
+def at(x: float, y: float, z: float) -> Mount:
+    """A device whose axes are those of the body."""
+    return Mount(np.array([x, y, z]), LEVEL)
+
+
+# --- how it is logged ------------------------------------------------------------------------------------
+
+
+def _samples(samples: Series | None) -> Series:
+    assert samples is not None
+    return samples
+
+
+def _pose(recording: Recording) -> tuple[Array, Array, Array]:
+    """Times, positions in mm, roll pitch yaw in deg."""
+    told = _samples(recording.mocap)
+    turns = Rotation.from_quat(told.values[:, 3:]).as_euler("ZYX", degrees=True)[:, ::-1]
+    return told.time, 1e3 * told.values[:, :3], turns
+
+
+def _csv(path: Path, heads: str, *columns: Array) -> None:
+    np.savetxt(path, np.column_stack(columns), "%.6f", ",", header=heads, comments="")
+
+
+def _each(write: Callable[[Recording, Path], None]) -> Callable[[ri.Simulated, Path], None]:
+    def all_of_them(made: ri.Simulated, folder: Path) -> None:
+        for recording in made.session.recordings:
+            write(recording, folder)
+
+    return all_of_them
+
+
+CAMERA = "time (s),x (mm),y (mm),z (mm),roll (deg),pitch (deg),yaw (deg)"
+ANGLE = "time (s),yaw (deg)"
+MARKER = "time (s),marker x (mm),marker y (mm)"
+GYROSCOPE = "time_ms,gyro_x_dps,gyro_y_dps,gyro_z_dps"
+CELLS = "time (s),F1 (N),F2 (N),F3 (N),F4 (N)"
+ALL = ",".join(
+    ["time (s)", *(f"cable_{i} (N)" for i in range(1, 5)), *(f"gyro {a} (rad/s)" for a in "xyz")]
+    + [f"acc {a} (m/s^2)" for a in "xyz"]
+    + [f"exciter {a} (N)" for a in "xyz"]
+)
+
+
+def _camera(recording: Recording, folder: Path) -> None:
+    _csv(folder / f"{recording.name}.csv", CAMERA, *_pose(recording))
+
+
+def _angle(recording: Recording, folder: Path) -> None:
+    time, _, turns = _pose(recording)
+    _csv(folder / f"{recording.name}.csv", ANGLE, time, turns[:, 2])
+
+
+def _marker(recording: Recording, folder: Path) -> None:
+    time, place, _ = _pose(recording)
+    _csv(folder / f"{recording.name}.csv", MARKER, time, place[:, :2])
+
+
+def _gyroscope(recording: Recording, folder: Path) -> None:
+    told = _samples(recording.imu)
+    _csv(folder / f"{recording.name}.csv", GYROSCOPE, 1e3 * told.time, np.degrees(told.values[:, :3]))
+
+
+def _mat(recording: Recording, folder: Path) -> None:
+    told = _samples(recording.mocap)
+    names = {"time": told.time, "position": told.values[:, :3], "quaternion": told.values[:, 3:]}
+    savemat(folder / f"{recording.name}.mat", names)
+
+
+def _phone(recording: Recording, folder: Path) -> None:
+    """phyphox' export: gyroscope and accelerometer at times of their own."""
+    told = _samples(recording.imu)
+    later = told.time[:-1] + 0.46 * np.diff(told.time)
+    felt = np.column_stack([np.interp(later, told.time, column) for column in told.values[:, 3:].T])
+    parts = (
+        ("Gyroscope", "Gyroscope", "rad/s", told.time, told.values[:, :3]),
+        ("Accelerometer", "Acceleration", "m/s^2", later, felt),
+    )
+    with zipfile.ZipFile(folder / f"{recording.name}.zip", "w") as archive:
+        for name, word, unit, times, values in parts:
+            heads = ",".join(f'"{h}"' for h in ("Time (s)", *(f"{word} {a} ({unit})" for a in "xyz")))
+            text = io.StringIO()
+            table = np.column_stack([times, values])
+            np.savetxt(text, table, "%.9E", ",", header=heads, comments="")
+            archive.writestr(f"{name}.csv", text.getvalue())
+
+
+def _ulog(recording: Recording, folder: Path) -> None:
+    """The log of an autopilot (PX4), written from its format's description."""
+    told = _samples(recording.imu)
+
+    def message(kind: str, content: bytes) -> bytes:
+        return struct.pack("<HB", len(content), ord(kind)) + content
+
+    fields = "uint64_t timestamp;uint64_t timestamp_sample;float x;float y;float z;"
+    out = io.BytesIO()
+    out.write(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message("B", bytes(40)))
+    topics = {"sensor_gyro": told.values[:, :3], "sensor_accel": told.values[:, 3:]}
+    for topic in topics:
+        out.write(message("F", f"{topic}:{fields}".encode()))
+    for number, (topic, values) in enumerate(topics.items()):
+        out.write(message("A", struct.pack("<BH", 0, number) + topic.encode()))
+        for time, row in zip(told.time, values, strict=True):
+            stamps = (round(1e6 * time) + 300, round(1e6 * time) + 50)
+            out.write(message("D", struct.pack("<HQQfff", number, *stamps, *row)))
+    (folder / f"{recording.name}.ulg").write_bytes(out.getvalue())
+
+
+def _cells(recording: Recording, folder: Path) -> None:
+    tension = [_samples(recording.tension[f"cable_{i}"]) for i in range(1, 5)]
+    columns = [np.interp(tension[0].time, t.time, t.values[:, 0]) for t in tension]
+    _csv(folder / f"{recording.name}.csv", CELLS, tension[0].time, *columns)
+
+
+def _all(recording: Recording, folder: Path) -> None:
+    """A logger that samples everything at once."""
+    clock = _samples(recording.imu).time
+    parts = [_samples(recording.tension[f"cable_{i}"]) for i in range(1, 5)]
+    parts += [_samples(recording.imu), _samples(recording.exciter_force)]
+    columns = [np.interp(clock, p.time, column) for p in parts for column in p.values.T]
+    _csv(folder / f"{recording.name}.csv", ALL, clock, *columns)
+
+
+def _ros1(made: ri.Simulated, folder: Path) -> None:
+    """Bags of ROS 1 with a pose under the name that its driver gave it."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types: Any = store.types
+    (folder / "session").mkdir()
+    for recording in made.session.recordings:
+        told = _samples(recording.mocap)
+        with Writer(folder / "session" / f"{recording.name}.bag") as bag:
+            kind = "geometry_msgs/msg/PoseStamped"
+            topic = bag.add_connection("/vrpn_client_node/bar/pose", kind, typestore=store)
+            for i, (time, row) in enumerate(zip(told.time, told.values, strict=True)):
+                stamp = recording.start_ns + round(1e9 * time)
+                header = types["std_msgs/msg/Header"](
+                    i, types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9), "world"
+                )
+                pose = types["geometry_msgs/msg/Pose"](
+                    types["geometry_msgs/msg/Point"](*row[:3]),
+                    types["geometry_msgs/msg/Quaternion"](*row[3:]),
+                )
+                content = store.serialize_ros1(types[kind](header, pose), kind)
+                bag.write(topic, stamp, content)
+
+
+MOCAP = {"mocap_position": 0.0003, "mocap_orientation": 0.001}
+INERTIAL = {"angular_rate": 0.001, "specific_force": 0.02}
+KINDS = {
+    kind.page: kind
+    for kind in (
+        Kind(
+            "camera", lambda: turned(bar(mocap=at(0.4, 0.0, 0.0), noise=MOCAP), BAR, 3, mocap=60.0),
+            _each(_camera), ("Jzz",), CAMERA,
+        ),
+        Kind(
+            "one-angle", lambda: turned(bar(mocap=at(0.4, 0.0, 0.0), noise=MOCAP), BAR, 4, mocap=60.0),
+            _each(_angle), ("Jzz",), ANGLE,
+        ),
+        Kind(
+            "phone", lambda: turned(bar(imu=at(0.4, 0.0, 0.0), noise=INERTIAL), BAR, 5),
+            _each(_phone), ("Jzz",),
+        ),
+        Kind(
+            "drone", lambda: turned(bar(imu=at(0.4, 0.0, -0.05), noise=INERTIAL), BAR, 6),
+            _each(_ulog), ("Jzz",),
+        ),
+        Kind(
+            "one-marker", lambda: turned(plate(mocap=at(0.55, 0.17, 0.05), noise=MOCAP), PLATE, 7, mocap=60.0),
+            _each(_marker), ("Jzz",), MARKER,
+        ),
+        Kind(
+            "motion-capture",
+            lambda: turned(plate(mocap=at(0.3, 0.2, 0.05), noise=MOCAP), PLATE, 8, mocap=120.0),
+            _each(_mat), ("Jzz",),
+        ),
+        Kind(
+            "gyroscope", lambda: turned(plate(imu=at(0.3, 0.2, 0.05), noise=INERTIAL), PLATE, 9),
+            _each(_gyroscope), ("Jzz",), GYROSCOPE,
+        ),
+        Kind(
+            "load-cells",
+            lambda: ri.simulate(
+                engine(noise={"tension": 0.5}), body=ENGINE, start="pulled", duration=10.0, rest=5.0, seed=10
+            ),
+            _each(_cells), ("m", "Jzz"), CELLS,
+        ),
+        Kind(
+            "everything",
+            lambda: ri.simulate(
+                engine(
+                    imu=at(0.45, 0.3, -0.1), exciter=at(0.45, 0.35, -0.6),
+                    noise={"tension": 0.5, "exciter_force": 0.2, **INERTIAL},
+                ),
+                body=ENGINE, start="rest", motor=[1.5, 0.15, 1.1], plane="xz", duration=12.0, rest=5.0,
+                seed=11,
+            ),
+            _each(_all), ("m", "Jxx", "Jyy", "Jzz"), ALL,
+        ),
+        Kind(
+            "ros-1-bag", lambda: turned(bar(mocap=at(0.4, 0.0, 0.0), noise=MOCAP), BAR, 12, mocap=100.0),
+            _ros1, ("Jzz",),
+        ),
+    )
+}  # fmt: skip
