@@ -31,17 +31,20 @@ SHELL = re.compile(r"^ *```(?:sh|bash|console|)\n(.*?)^ *```$", re.DOTALL | re.M
 OUTSIDE = ("python3", "pip", "ros2", "colcon", "sbatch", "interfaces/build.sh")
 #: ``rig`` and ``ui`` run until they are stopped.
 ENDLESS = ("rig", "ui")
-#: Blocks that are run by another test, by page.
-ELSEWHERE = {
-    "docs/how-to/import.md": "test_newcomer.py",
-    "docs/how-to/own-effect.md": "test_own_effect.py",
-    "docs/thesis.md": "test_thesis_rerun.py",
-}
 
 
 def name_of(page: Path) -> str:
     """A page as it is named here."""
     return page.relative_to(ROOT).as_posix()
+
+
+#: Blocks that are run by another test, by page.
+ELSEWHERE = {
+    "docs/how-to/import.md": "test_newcomer.py",
+    "docs/how-to/own-effect.md": "test_own_effect.py",
+    "docs/thesis.md": "test_thesis_rerun.py",
+    **{name_of(page): "test_docs_recordings.py" for page in sorted((DOCS / "recordings").glob("*.md"))},
+}
 
 
 def commands(block: str) -> list[str]:
