@@ -150,13 +150,11 @@ def _mat(recording: Recording, folder: Path) -> None:
 
 
 def _phone(recording: Recording, folder: Path) -> None:
-    """phyphox' export: gyroscope and accelerometer at times of their own."""
+    """phyphox' export: gyroscope and accelerometer at times of their own, which come by turns."""
     told = _samples(recording.imu)
-    later = told.time[:-1] + 0.46 * np.diff(told.time)
-    felt = np.column_stack([np.interp(later, told.time, column) for column in told.values[:, 3:].T])
     parts = (
-        ("Gyroscope", "Gyroscope", "rad/s", told.time, told.values[:, :3]),
-        ("Accelerometer", "Acceleration", "m/s^2", later, felt),
+        ("Gyroscope", "Gyroscope", "rad/s", told.time[::2], told.values[::2, :3]),
+        ("Accelerometer", "Acceleration", "m/s^2", told.time[1::2], told.values[1::2, 3:]),
     )
     with zipfile.ZipFile(folder / f"{recording.name}.zip", "w") as archive:
         for name, word, unit, times, values in parts:
@@ -188,21 +186,40 @@ def _ulog(recording: Recording, folder: Path) -> None:
     (folder / f"{recording.name}.ulg").write_bytes(out.getvalue())
 
 
+def _lines(path: Path, heads: str, channels: list[Series]) -> None:
+    """A line whenever a device has a sample; what the others did not measure then stays empty.
+
+    Nothing is brought to a common rate: that would colour the noise.
+    """
+    width = sum(channel.values.shape[1] for channel in channels)
+    lines: list[tuple[float, list[str]]] = []
+    first = 0
+    for channel in channels:
+        for time, row in zip(channel.time, channel.values, strict=True):
+            cells = [""] * width
+            cells[first : first + len(row)] = [f"{value:.6f}" for value in row]
+            lines.append((float(time), cells))
+        first += channel.values.shape[1]
+    lines.sort(key=lambda line: line[0])
+    told = [heads, *(",".join([f"{time:.6f}", *cells]) for time, cells in lines)]
+    path.write_text("\n".join(told) + "\n", encoding="utf-8")
+
+
+def _tensions(recording: Recording) -> list[Series]:
+    return [_samples(recording.tension[f"cable_{i}"]) for i in range(1, 5)]
+
+
 def _cells(recording: Recording, folder: Path) -> None:
-    tension = [_samples(recording.tension[f"cable_{i}"]) for i in range(1, 5)]
-    columns = [np.interp(tension[0].time, t.time, t.values[:, 0]) for t in tension]
-    _csv(folder / f"{recording.name}.csv", CELLS, tension[0].time, *columns)
+    _lines(folder / f"{recording.name}.csv", CELLS, _tensions(recording))
 
 
 def _all(recording: Recording, folder: Path) -> None:
-    """A logger that samples everything at once; the exciter's cells are not logged at rest."""
-    clock = _samples(recording.imu).time
-    parts = [_samples(recording.tension[f"cable_{i}"]) for i in range(1, 5)] + [_samples(recording.imu)]
+    """The exciter's cells are not logged at rest."""
+    parts = [*_tensions(recording), _samples(recording.imu)]
     if recording.exciter_force is not None:
         parts.append(recording.exciter_force)
-    columns = [np.interp(clock, p.time, column) for p in parts for column in p.values.T]
-    heads = ",".join(ALL.split(",")[: 1 + len(columns)])
-    _csv(folder / f"{recording.name}.csv", heads, clock, *columns)
+    width = sum(part.values.shape[1] for part in parts)
+    _lines(folder / f"{recording.name}.csv", ",".join(ALL.split(",")[: 1 + width]), parts)
 
 
 def _ros1(made: ri.Simulated, folder: Path) -> None:
