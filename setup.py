@@ -116,7 +116,7 @@ setup(
         "pdf": ["fpdf2>=2.7.9"],
         "completion": ["shtab>=1.6"],
         "browser": ["playwright>=1.40"],
-        "docs": ["mkdocs-material>=9.5"],
+        "docs": ["mkdocs-material>=9.5", "mkdocstrings[python]>=0.27"],
         "dev": ["exudyn>=1.8", "mujoco>=3.1", "mypy>=1.10"],
     },
     entry_points={"console_scripts": ["rig-identification = rig_identification.cli.main:main", *NODES]},

@@ -31,17 +31,20 @@ SHELL = re.compile(r"^ *```(?:sh|bash|console|)\n(.*?)^ *```$", re.DOTALL | re.M
 OUTSIDE = ("python3", "pip", "ros2", "colcon", "sbatch", "interfaces/build.sh")
 #: ``rig`` and ``ui`` run until they are stopped.
 ENDLESS = ("rig", "ui")
-#: Blocks that are run by another test, by page.
-ELSEWHERE = {
-    "docs/how-to/import.md": "test_newcomer.py",
-    "docs/how-to/own-effect.md": "test_own_effect.py",
-    "docs/thesis.md": "test_thesis_rerun.py",
-}
 
 
 def name_of(page: Path) -> str:
     """A page as it is named here."""
     return page.relative_to(ROOT).as_posix()
+
+
+#: Blocks that are run by another test, by page.
+ELSEWHERE = {
+    "docs/how-to/import.md": "test_newcomer.py",
+    "docs/how-to/own-effect.md": "test_own_effect.py",
+    "docs/thesis.md": "test_thesis_rerun.py",
+    **{name_of(page): "test_docs_recordings.py" for page in sorted((DOCS / "recordings").glob("*.md"))},
+}
 
 
 def commands(block: str) -> list[str]:
@@ -111,6 +114,12 @@ def own_rig(folder: Path) -> None:
     simulated("SESSION")(folder)
 
 
+def certified(folder: Path) -> None:
+    """A session, and the page's own description of a laboratory."""
+    simulated("SESSION")(folder)
+    (folder / "lab.yaml").write_text(blocks(DOCS / "how-to" / "certificate.md", "yaml")[0], encoding="utf-8")
+
+
 def remembered(folder: Path) -> None:
     """Results of sessions on a rig, and one that is recorded today."""
     simulated("today", "monday")(folder)
@@ -141,7 +150,12 @@ CASES = (
     ),
     Case("docs/how-to/rig-memory.md", (1,), remembered, ("today_with_memory/result.json",)),
     Case("docs/how-to/fuse.md", (0,), simulated("high", "low"), ("both/result.json",)),
-    Case("docs/how-to/certificate.md", (0,), simulated("SESSION"), ("certified/certificate.pdf",)),
+    Case(
+        "docs/how-to/certificate.md",
+        (0, 1),
+        certified,
+        ("certified/certificate.pdf", "certified/certificate.xml"),
+    ),
     Case("docs/how-to/own-rig.md", (0, 1), own_rig, ("trial_answer/report.html", "ANSWER/report.html")),
     Case("docs/how-to/batch.md", (0,), simulated("sessions/a", "sessions/b"), ("results/a/result.json",)),
     Case("docs/how-to/plan.md", (0,), described, ("plan/plan.html", "plan/session.yaml")),

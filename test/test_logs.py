@@ -21,6 +21,7 @@ from rig_identification.logs.convert import recording_of
 from rig_identification.logs.formats import read_log
 from rig_identification.logs.formats.csv_text import table_of
 from rig_identification.logs.guess import guess, words_of
+from rig_identification.logs.importing import recordings, understand
 from rig_identification.logs.log import ONLY, Column, Log, Table
 from rig_identification.logs.quantities import FIXED, quantity
 from rig_identification.logs.units import UNITS, factor, known_unit
@@ -124,6 +125,9 @@ def test_without_a_date_logs_stand_apart_and_say_none() -> None:
         ("marker_pos_z", "mm", "mocap.position.z"),
         ("x", "mm", "mocap.position.x"),
         ("qw", "", "mocap.quaternion.w"),
+        ("quaternion.w", "", "mocap.quaternion.w"),
+        ("orientation w", "", "mocap.quaternion.w"),
+        ("w_z", "rad/s", "imu.angular_rate.z"),
         ("yaw", "deg", "mocap.yaw"),
         ("magnetic rate x", "", None),
         ("gyro_x", "V", "imu.angular_rate.x"),  # an unknown unit states nothing
@@ -419,3 +423,28 @@ def test_nothing_used_is_said() -> None:
     log = Log((Table(ONLY, (Column("t", TIME), Column("temperature", TIME))),))
     with pytest.raises(InputError, match=r"no column that is used; say in columns\.yaml"):
         recording_of(log, Columns(), "run", "run.csv")
+
+
+def test_what_one_file_lacks_is_taken_from_the_others(tmp_path: Path) -> None:
+    """The exciter is not logged at rest: the guess holds it all the same, whichever file comes first."""
+    heads = [*IMU_HEADS, "exciter x (N)"]
+    still, moving = tmp_path / "still.csv", tmp_path / "run.csv"
+    still.write_text(text_table(IMU_HEADS, IMU_ROWS), encoding="utf-8")
+    moving.write_text(text_table(heads, np.column_stack([IMU_ROWS, TIME])), encoding="utf-8")
+    for files in ((still, moving), (moving, still)):
+        understood = understand(files)
+        assert "exciter x (N): {is: exciter.force.x, unit: N}" in understood.text
+        made = {recording.name: recording for recording in recordings(understood)}
+        assert made["still"].exciter_force is None
+        assert imu(made["still"]) == pytest.approx(np.hstack([RATE, FORCE]), abs=1e-6)
+        told = made["run"].exciter_force
+        assert told is not None
+        assert told.values[:, 0] == pytest.approx(TIME, abs=1e-6)
+
+
+def test_a_column_that_no_file_holds_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text(text_table(IMU_HEADS, IMU_ROWS), encoding="utf-8")
+    text = understand([tmp_path / "run.csv"]).text.replace("gyro_x:", "giro_x:")
+    (tmp_path / "columns.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"holds no column giro_x; .*did you mean gyro_x"):
+        recordings(understand([tmp_path / "run.csv"], tmp_path / "columns.yaml"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -68,3 +69,35 @@ def test_every_executable_runs_from_the_install_folder(tmp_path: Path) -> None:
             name,
             *(expected if name == "replay" else (0, "")),
         )
+
+
+@pytest.mark.long
+@pytest.mark.skipif(COLCON is None, reason="colcon is not installed: pip install colcon-common-extensions")
+def test_both_packages_build_in_one_workspace(tmp_path: Path) -> None:
+    """The command of docs/how-to/typed-interface.md, against the wheels; what it builds is imported."""
+    pytest.importorskip("ament_package", reason="pip install '.[interfaces]'")
+    for tool in ("cmake", "c++"):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+    assert COLCON is not None
+    page = (ROOT / "docs" / "how-to" / "typed-interface.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"^colcon (build .*)$", page, re.MULTILINE)
+    ignored = shutil.ignore_patterns(
+        ".*", "__pycache__", "build", "install", "log", "*.egg-info", "test", "bench"
+    )
+    shutil.copytree(ROOT, tmp_path / "src" / "rig_identification", ignore=ignored)
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    path = f"{Path(sysconfig.get_path('scripts'))}{os.pathsep}{environment['PATH']}"
+    environment |= {"PATH": path, "AMENT_PREFIX_PATH": sys.prefix, "CMAKE_PREFIX_PATH": sys.prefix}
+    command = [COLCON, *line.split(), "--cmake-args", f"-DPython3_EXECUTABLE={sys.executable}"]
+    built = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert built.returncode == 0, built.stdout + built.stderr
+    assert "2 packages finished" in built.stdout
+    code = (
+        "from rig_identification_interfaces.action import IdentifyInertia as I; print(I.Goal(session='car'))"
+    )
+    script = f'source install/setup.bash && exec "{sys.executable}" -c "{code}"'
+    told = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert "session='car'" in told.stdout, told.stderr

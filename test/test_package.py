@@ -26,6 +26,7 @@ VALUES = {
         "examination",
         "files",
         "joint",
+        "laboratory",
         "optional",
         "own",
         "quantity",

@@ -59,6 +59,18 @@ class Columns:
         found = [one.cable for word in words if (one := quantity(word)) is not None and one.cable]
         return tuple(dict.fromkeys(found))
 
+    def held_by(self, log: Log) -> Columns:
+        """Those of the columns that a log holds; a table without its column of time is not used."""
+        held = {}
+        for name, chosen in self.tables.items():
+            table = log.table(name)
+            names = {column.name for column in table.columns} if table is not None else set()
+            timed = chosen.time.column if chosen.time is not None else None
+            if table is not None and (timed is None or timed in names):
+                left = {column: one for column, one in chosen.columns.items() if column in names}
+                held[name] = replace(chosen, columns=left)
+        return Columns(held)
+
     def with_rate(self, rate: float | None) -> Columns:
         """The same with a rate (Hz) for each table that has no column of time."""
         if rate is None:

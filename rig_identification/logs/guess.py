@@ -18,6 +18,7 @@ _TIME = {"time", "t", "timestamp", "timestamps", "seconds", "elapsed", "zeit", "
 #: Words of a name -> what is measured.
 _KINDS = (
     ("none", {"gravity", "magnetic", "magnetometer", "temperature", "covariance"}),
+    ("mocap", {"quaternion", "quat", "orientation"}),  # before the rates, one of whose names is w
     ("shaft", {"shaft", "encoder", "rpm"}),
     ("exciter", {"exciter", "shaker", "motor"}),
     ("angular_rate", {"gyro", "gyr", "gyroscope", "angular", "omega", "rate", "w", "rotation"}),

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig_identification.errors import InputError
-from rig_identification.logs.columns import Columns, columns_text, read_columns
+from rig_identification.logs.columns import Columns, check_columns, columns_text, read_columns
 from rig_identification.logs.convert import recording_of
 from rig_identification.logs.formats import read_log
 from rig_identification.logs.guess import guess
-from rig_identification.logs.log import Log
+from rig_identification.logs.log import Log, of_all
 from rig_identification.recording import Recording
 from rig_identification.session.write import write_bag
 from rig_identification.topics import DEFAULT_NAMESPACE, expected_topics
@@ -45,7 +45,7 @@ def understand(
     Parameters
     ----------
     files : sequence of Path
-        One a recording; all with the same columns.
+        One a recording. What one of them lacks was not measured in it.
     columns_file : Path, optional
         The ``columns.yaml`` that says what the columns are; without it they are guessed.
     rate : float, optional
@@ -64,21 +64,23 @@ def understand(
             progress(f"reading {file.name}")
         logs.append(read_log(file))
     source = ", ".join(file.name for file in files)
+    together = of_all(logs)
     if columns_file is not None:
         columns = read_columns(columns_file)
-        text = columns_text(columns, logs[0], {}, source)
+        text = columns_text(columns, together, {}, source)
     else:
-        found = guess(logs[0])
+        found = guess(together)
         columns = found.columns.with_rate(rate)
-        text = columns_text(columns, logs[0], found.remarks, source)
+        text = columns_text(columns, together, found.remarks, source)
     return Understood(_names(files), tuple(files), tuple(logs), columns, text)
 
 
 def recordings(understood: Understood) -> tuple[Recording, ...]:
-    """The recording of each log. Raises InputError."""
+    """The recording of each log. Raises InputError, of a column too that none of the logs holds."""
+    check_columns(understood.columns, of_all(understood.logs), ", ".join(map(str, understood.files)))
     together = zip(understood.logs, understood.names, understood.files, strict=True)
     return tuple(
-        recording_of(log, understood.columns, name, str(file), number)
+        recording_of(log, understood.columns.held_by(log), name, str(file), number)
         for number, (log, name, file) in enumerate(together)
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +46,20 @@ class Log:
     def table(self, name: str) -> Table | None:
         """The table of a name."""
         return next((table for table in self.tables if table.name == name), None)
+
+
+def of_all(logs: Sequence[Log]) -> Log:
+    """Every table and column that any of the logs holds, each from the first one that holds it.
+
+    It stands for what the columns are called and what they hold. Columns of one table may differ in length.
+    """
+    found: dict[str, dict[str, Column]] = {}
+    for log in logs:
+        for table in log.tables:
+            columns = found.setdefault(table.name, {})
+            for column in table.columns:
+                columns.setdefault(column.name, column)
+    return Log(tuple(Table(name, tuple(columns.values())) for name, columns in found.items()))
 
 
 def numbered(names: list[str]) -> list[str]:

@@ -61,7 +61,7 @@ def write_certificate_pdf(certificate: Certificate, path: Path) -> None:
         _text(pdf, f"- {finding}", TEXT)
     for body in certificate.bodies:
         _table(pdf, numbers_table(body.heading, body.numbers), (3, 3, 3, 2, 2, 1, 3))
-        _table(pdf, budget_table(body), (5, 3, *(2,) * 10))
+        _table(pdf, budget_table(body), (7, 3, *(2,) * 10))
         _table(pdf, correlation_table(body), (2,) * 11)
     if certificate.vehicle:
         _table(pdf, numbers_table("Vehicle", certificate.vehicle), (6, 3, 3, 2, 2, 1, 3))
