@@ -279,7 +279,9 @@ KINDS = {
         Kind("one-angle", lambda: _bar_seen(4, 60.0), _each(_angle), JZZ, ANGLE),
         Kind("phone", lambda: _bar_felt(5, 0.0), _each(_phone), JZZ),
         Kind("drone", lambda: _bar_felt(6, -0.05), _each(_ulog), JZZ),
-        Kind("one-marker", lambda: _plate_seen(at(0.55, 0.17, 0.05), 7, 60.0), _each(_marker), JZZ, MARKER),
+        Kind(
+            "one-marker", lambda: _plate_seen(at(0.55, 0.17, 0.05), 7, 60.0), _each(_marker), ("m",), MARKER
+        ),
         Kind("motion-capture", lambda: _plate_seen(at(0.3, 0.2, 0.05), 8, 120.0), _each(_mat), JZZ),
         Kind(
             "gyroscope",

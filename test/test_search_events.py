@@ -24,6 +24,8 @@ def test_what_stands_out_for_a_while() -> None:
     # It comes again
     squares[70] = 60.0
     assert _stretches(squares) == [(40, 44), (70, 71)]
+    # ... beside something that is there all the time
+    assert _stretches(squares + 15.0) == []
     # ... and again
     squares[[10, 20, 30, 55, 85]] = 60.0
     assert _stretches(squares) == []

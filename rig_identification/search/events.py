@@ -41,8 +41,9 @@ OUTSIDE = 0.5
 SEEN = 0.25
 #: Seconds over which the wrench is averaged.
 BIN = 0.25
-#: Pushes stand out of the wrench at all other times by this factor (of its square), in so much of the time
-#: and so many stretches at most: what swings, rubs or lags comes to as much again and again.
+#: Pushes stand out of the wrench at all other times by this factor (of its square), by it once more for each
+#: further one, in so much of the time and so many stretches at most: what swings, rubs or lags comes to as much
+#: again and again, and a body on springs stood out of its own wrench three times.
 STANDS_OUT, FOR, SEVERAL = 5.0, 0.2, 3
 #: Bins on either side of what stands out in which it may begin and end.
 ABOUT = 2
@@ -120,7 +121,11 @@ def _stretches(squares: Array) -> list[tuple[int, int]]:
     parts = np.split(high, np.flatnonzero(np.diff(high) > 2 * ABOUT) + 1)
     found = [(int(part[0]), int(part[-1]) + 1) for part in parts]
     lasting = sum(last - first for first, last in found)
-    return found if len(found) <= SEVERAL and lasting <= FOR * squares.size else []
+    outside = np.ones(squares.size, dtype=bool)
+    for first, last in found:
+        outside[max(0, first - ABOUT) : last + ABOUT] = False
+    alone = np.all(squares[outside] <= np.max(squares) / STANDS_OUT ** len(found))
+    return found if alone and len(found) <= SEVERAL and lasting <= FOR * squares.size else []
 
 
 def explained_outside(
