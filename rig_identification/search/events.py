@@ -42,8 +42,8 @@ SEEN = 0.25
 #: Seconds over which the wrench is averaged.
 BIN = 0.25
 #: Pushes stand out of the wrench at all other times by this factor (of its square), by it once more for each
-#: further one, in so much of the time and so many stretches at most: what swings, rubs or lags comes to as much
-#: again and again, and a body on springs stood out of its own wrench three times.
+#: further one, in so much of the time and so many stretches at most. What swings, rubs or lags comes to as
+#: much again and again: a body on springs stood out of its own wrench three times.
 STANDS_OUT, FOR, SEVERAL = 5.0, 0.2, 3
 #: Bins on either side of what stands out in which it may begin and end.
 ABOUT = 2

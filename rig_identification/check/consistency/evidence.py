@@ -135,7 +135,7 @@ class Evidence:
             return self.plain.cost
         cost = self.plain.parts["rest"]
         for run, motion in zip(self.session.runs[:RUNS], other.motions, strict=False):
-            begun = _best_motion(self.session.rig, run, self.plain.rest, motion, moved=False)[1]
+            begun = _best_motion(self.session.rig, run, self.plain.rest, motion, moved=True)[1]
             cost += sum(begun.values())
         return min(self.plain.cost, cost)
 
