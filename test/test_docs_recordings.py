@@ -90,6 +90,17 @@ def test_the_files_become_a_session(kind: Kind, tmp_path: Path, monkeypatch: pyt
         assert len(used) == len(kind.heads.split(",")) - 1
 
 
+@pytest.mark.parametrize("page", ["gyroscope", "motion-capture"])
+def test_nothing_is_wrong_with_what_a_page_describes(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Any scale of the description's lengths gives such a body the same motion: no unit is told."""
+    prepared(KINDS[page], tmp_path, monkeypatch)
+    for line in commands(KINDS[page])[:-1]:
+        assert main(line) == 0, line
+    assert "No fault of the set-up was found." in capsys.readouterr().out
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.page)
 def test_a_page_leads_to_the_number(kind: Kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,6 +34,8 @@ AWAY = 0.2
 UPSIDE_DOWN = np.pi
 #: Fits settle in fewer steps; one that improves by less than a tenth of a nat has settled.
 STEPS, SETTLED = 8, 0.1
+#: Share of a step that is taken where no whole one pays.
+SHORTER = 0.5
 
 
 @dataclass(frozen=True)
@@ -91,11 +93,19 @@ class MotionModel:
         """Fit the motion to readings by device (N, width), linearised after each step until it settles.
 
         From rest a large swing is overshot at first: a step that doubles the cost or more is taken all the
-        same, and the best motion of all is kept.
+        same, and the best motion of all is kept. Where no such step pays, shorter ones are taken.
         """
         at = about or self.at_rest()
+        best = self._settled(values, at, 1.0, STEPS)
+        if best.trajectory is not at:
+            return best
+        shorter = self._settled(values, at, SHORTER, int(STEPS / SHORTER))
+        return min(best, shorter, key=lambda fit: fit.total)
+
+    def _settled(self, values: Mapping[str, Array], at: Trajectory, share: float, steps: int) -> MotionFit:
+        """The best motion of so many steps, of each of which a ``share`` is taken."""
         best: MotionFit | None = None
-        for _ in range(STEPS + 1):
+        for _ in range(steps + 1):
             blocks = self._blocks(at, values)
             seen = self._looked_at(blocks, at)
             if best is not None and (not np.isfinite(seen.total) or _upside_down(at)):
@@ -103,15 +113,16 @@ class MotionModel:
             gained = np.inf if best is None else best.total - seen.total
             if best is None or gained > 0.0:
                 best = seen
-            if -best.total < gained < SETTLED:
+            if -best.total < gained < SETTLED and share == 1.0:
                 break
-            at = self._stepped(blocks, at)
+            at = self._stepped(blocks, at, share)
         assert best is not None
         return best
 
-    def _stepped(self, blocks: list[Block], at: Trajectory) -> Trajectory:
+    def _stepped(self, blocks: list[Block], at: Trajectory, share: float = 1.0) -> Trajectory:
         try:
-            return self._moved(at, self.spline.solve(blocks)[0])
+            q, v, a = self.spline.solve(blocks)[0]
+            return self._moved(at, (share * q, share * v, share * a))
         except (np.linalg.LinAlgError, ValueError):  # a motion that has left every bound has no next step
             return at
 
