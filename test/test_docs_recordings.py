@@ -101,8 +101,14 @@ def test_nothing_is_wrong_with_what_a_page_describes(
     assert "No fault of the set-up was found." in capsys.readouterr().out
 
 
+#: Pages that say themselves that their search ends unexplained.
+OPEN = {"load-cells": pytest.mark.xfail(strict=True, reason="cells alone lose the start of a swing")}
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.page)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, id=k.page, marks=OPEN.get(k.page, ())) for k in KINDS.values()]
+)
 def test_a_page_leads_to_the_number(kind: Kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if kind.page == "drone":
         pytest.importorskip("pyulog", reason="pip install '.[ulog]'")
