@@ -10,18 +10,15 @@ from numpy.typing import NDArray
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Candidate, Told, added
-from rig_identification.mismatch.place_scan import Scales
-from rig_identification.mismatch.riders import middle_of
+from rig_identification.mismatch.place_scan import Scales, point_near_middle
 from rig_identification.model import layout
 from rig_identification.model.effects import place
+from rig_identification.model.effects.air_drag import AIR
 from rig_identification.model.motion import Motion, RigModel
 from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: kg/m^3 of air: times the cube of the rig's longest side, what a body of that size may carry along each axis
-#: (std of the prior). A square plate carries 0.48 of it, a sphere as wide 0.26 (Lamb 1932).
-DENSITY = 1.2
 #: Name of the amounts: one such place is in a model at most.
 CARRIED_NAME = "air.carried"
 
@@ -42,12 +39,7 @@ class CarriedAir:
             added(f"{CARRIED_NAME}.{a}", "kg", _plausible(scales), block + place.AIR_CARRIED + i)
             for i, a in enumerate(AXES)
         )
-        point = tuple(
-            added(
-                f"air_added_mass.point.{a}", "m", 0.3 * scales.size, block + place.AIR_CARRIED_POINT + i, at
-            )
-            for i, (a, at) in enumerate(zip(AXES, middle_of(rig), strict=True))
-        )
+        point = point_near_middle("air_added_mass", rig, 0.3 * scales.size, place.AIR_CARRIED_POINT)
 
         def told(found: Estimates) -> Told:
             each = {f"added_mass_{a}": (*found.of(m.name), "kg") for a, m in zip(AXES, masses, strict=True)}
@@ -95,5 +87,8 @@ class CarriedAir:
 
 
 def _plausible(scales: Scales) -> float:
-    """kg, std of the prior of each mass."""
-    return DENSITY * scales.size**3
+    """kg, std of the prior of each mass: air of the volume of a cube as wide as the rig's longest side.
+
+    A square plate of that side carries 0.48 of it along, a sphere as wide 0.26 (Lamb 1932).
+    """
+    return AIR * scales.size**3

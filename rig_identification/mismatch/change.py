@@ -37,9 +37,8 @@ class Change:
     """Numbers that become other ones, once or several times."""
 
     group: Group
-    steps: tuple[
-        tuple[Stretch, ...], ...
-    ]  # of every step, the stretches in which it counts; the oldest first
+    #: Of every step the stretches in which it counts, the oldest first
+    steps: tuple[tuple[Stretch, ...], ...]
     nets: tuple[float, ...]  # nats that each step adds to the log evidence, to first order
     durations: Mapping[str, float]  # s, of every recording
 

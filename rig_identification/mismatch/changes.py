@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import INERTIAL, Parameter, ParameterSet, Stretch
 from rig_identification.estimate.solve import Evaluation, Problem
-from rig_identification.mismatch.beyond import Beyond
+from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.change import Change, Group, within
 from rig_identification.mismatch.screen import Promise, opened_with, promise_of
@@ -47,6 +48,8 @@ LOAD = 0.03
 ALIKE, SHARE = 4, 0.5
 #: Steps of the same numbers that are told apart at most.
 STEPS = 6
+#: Share of its own information that is added to a start's, which has no prior.
+SLIGHT = 1e-9
 
 
 def likeliest_changes(
@@ -192,6 +195,14 @@ class _Restricted:
         return replace(self, part=self.part.of(np.concatenate([group, starts])))
 
 
+@dataclass(frozen=True)
+class _Step:
+    """One group's columns from an instant on, and what is left of them beside all that is free anyway."""
+
+    restricted: _Restricted
+    columns: Columns
+
+
 class _Asked:
     """All changes of a linearised problem."""
 
@@ -206,6 +217,7 @@ class _Asked:
         self._places = self._size + np.concatenate([[0], np.cumsum(starts)]).astype(int)
         # W J and W r of every run
         self._across = [(r.wander.without(r.jacobian), r.wander.without(r.residual)) for r in full.runs]
+        self._taken = [run.wander.taken for run in full.runs]
         self._whole = {name: self._of_recording(name) for name in self._recordings()}
         instants = sum(self._instants(i).size for i in range(len(full.runs)))
         between = max(1, len(self._between()))
@@ -215,13 +227,13 @@ class _Asked:
 
     def all(self) -> Iterator[_Told]:
         """Every group in every set of recordings, and from every instant on."""
-        for restricted in (*self._from_recordings(), *self._from_all_instants()):
+        for restricted in chain(self._from_recordings(), self._from_all_instants()):
             yield from self._told(restricted)
 
     def near(self, best: _Told) -> Iterator[_Told]:
         """The same group from instants about the best one's on."""
         for restricted in self._about(best.stretches):
-            yield self._net(restricted, best.group, ())
+            yield self._net(self._step(restricted, best.group), best.group, ())
 
     def stepped(self, first: _Told) -> list[_Told]:
         """Further steps of the same numbers that add to the evidence of the ``first``, the oldest first.
@@ -229,22 +241,29 @@ class _Asked:
         Where a number stays what it became, it may become another one again at any time. What counts in one
         recording alone is asked again there alone.
         """
-        group = first.group
-        lasts = self._lasts(first.stretches)
-        found = [(first, self._at(first.stretches))]
-        asked = [r for r in self._from_all_instants() if self._nested(r, first, lasts)]
+        group, lasts = first.group, self._lasts(first.stretches)
+
+        def beside(restricted: Iterator[_Restricted]) -> list[_Step]:
+            return [self._step(r, group) for r in restricted if self._nested(r, first, lasts)]
+
+        found = [(first, self._step(self._at(first.stretches), group))]
+        asked = beside(self._from_all_instants())
         while len(found) < STEPS:
-            known = [restricted for _, restricted in found]
-            best = max(
-                ((self._net(r, group, known), r) for r in asked), key=lambda told: told[0].net, default=None
-            )
+            known = [step for _, step in found]
+            told = [(self._net(step, group, known), step) for step in asked]
+            best = max(told, key=lambda told: told[0].net, default=None)
             if best is None or best[0].net <= 0.0:
                 break
-            finer = [r for r in self._about(best[0].stretches) if self._nested(r, first, lasts)]
-            told = [best, *((self._net(r, group, known), r) for r in finer)]
+            finer = beside(self._about(best[0].stretches))
+            told = [best, *((self._net(step, group, known), step) for step in finer)]
             found.append(max(told, key=lambda told: told[0].net))
-            asked = [r for r in asked if self._apart(r.stretches, found[-1][0].stretches)]
+            asked = [s for s in asked if self._apart(s.restricted.stretches, found[-1][0].stretches)]
         return [told for told, _ in sorted(found, key=lambda f: self._time(f[0].stretches))]
+
+    def _step(self, restricted: _Restricted, group: int) -> _Step:
+        """One group's columns of what is ``restricted``."""
+        own = restricted.cut_to(self._of[group], self._maps.shape[1])
+        return _Step(own, self._beyond.of_sums(own.part.cross, own.part.right))
 
     def _nested(self, restricted: _Restricted, first: _Told, lasts: bool) -> bool:
         """Whether a step may stand beside the first one: of any two, one has all rows of the other."""
@@ -391,46 +410,35 @@ class _Asked:
 
     def _told(self, restricted: _Restricted) -> Iterator[_Told]:
         """Every group by itself in the same stretches."""
-        size = self._maps.shape[1]
-        part = restricted.part
+        size, part = self._maps.shape[1], restricted.part
         columns = self._beyond.of_sums(part.cross, part.right)
-        gradient = columns.right
         information = self._inner(restricted, restricted, size) - columns.seen.T @ columns.solved
-        if restricted.run is not None:
-            own = definite(information[size:, size:] + 1e-9 * np.diag(np.diag(information)[size:]))
-            across = np.linalg.solve(own, information[size:, :size])
-            gradient = gradient[:size] - across.T @ gradient[size:]
-            information = information[:size, :size] - information[:size, size:] @ across
+        starts = np.arange(size, part.right.size)
+        information[starts, starts] *= 1.0 + SLIGHT
+        information, gradient = _left(information, columns.right, np.arange(size))
         for group, own in enumerate(self._of):
             net = _gained(information[np.ix_(own, own)], gradient[own]) - restricted.charge
             yield _Told(group, restricted.stretches, net)
 
-    def _net(self, restricted: _Restricted, group: int, known: Sequence[_Restricted]) -> _Told:
+    def _net(self, step: _Step, group: int, known: Sequence[_Step]) -> _Told:
         """One group in some stretches, beside steps of it that are ``known``."""
-        own, size = self._of[group], self._maps.shape[1]
-        every = [r.cut_to(own, size) for r in (*known, restricted)]
-        columns = [self._beyond.of_sums(r.part.cross, r.part.right) for r in every]
-        ends = np.cumsum([r.part.right.size for r in every])
-        at = [slice(end - r.part.right.size, end) for end, r in zip(ends, every, strict=True)]
+        every, count = (*known, step), self._of[group].size
+        sizes = [one.columns.right.size for one in every]
+        ends = np.cumsum(sizes)
+        at = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         F = np.zeros((ends[-1], ends[-1]))
         for i, one in enumerate(every):
             for j, two in enumerate(every):
-                F[at[i], at[j]] = self._inner(one, two, own.size) - columns[i].seen.T @ columns[j].solved
-        gradient = np.concatenate([c.right for c in columns])
-        prior = np.concatenate([np.arange(r.part.right.size) < own.size for r in every])
-        F += np.diag(np.where(prior, 1.0, 1e-9 * np.diag(F)))
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(F), 1e-300))
-        unit, pull = F * np.outer(scale, scale), gradient * scale
-        asked = np.arange(at[-1].start, at[-1].start + own.size)
-        others = np.setdiff1d(np.arange(F.shape[0]), asked)
-        left = unit[np.ix_(asked, asked)]
-        if others.size:
-            across = np.linalg.solve(definite(unit[np.ix_(others, others)]), unit[np.ix_(others, asked)])
-            left = left - unit[np.ix_(asked, others)] @ across
-            pull = np.concatenate([pull[others], pull[asked] - across.T @ pull[others]])
-        information = left / np.outer(scale[asked], scale[asked]) - np.eye(own.size)
-        net = _gained(information, pull[-own.size :] / scale[asked]) - restricted.charge
-        return _Told(group, restricted.stretches, net)
+                inner = self._inner(one.restricted, two.restricted, count)
+                F[at[i], at[j]] = inner - one.columns.seen.T @ two.columns.solved
+        # Known numbers have their prior, starts hardly any; the prior of what is asked is added last
+        prior = np.concatenate([np.arange(size) < count for size in sizes])
+        asked = np.arange(ends[-1] - sizes[-1], ends[-1] - sizes[-1] + count)
+        more = np.where(prior, 1.0, SLIGHT * np.diag(F))
+        more[asked] = 0.0
+        gradient = np.concatenate([one.columns.right for one in every])
+        net = _gained(*_left(F + np.diag(more), gradient, asked)) - step.restricted.charge
+        return _Told(group, step.restricted.stretches, net)
 
     def _inner(self, one: _Restricted, two: _Restricted, count: int) -> Array:
         """(q, p) information that columns have in common. count: of numbers, which stand before the start's.
@@ -442,9 +450,19 @@ class _Asked:
         together = np.zeros((one.part.right.size, two.part.right.size))
         shown = one.part.right.size if one.run == two.run else count
         together[:shown] = two.part.gram[:shown]
-        for run, own, other in zip(self._full.runs, one.part.zeros, two.part.zeros, strict=True):
-            together -= own.T @ run.wander.taken @ other
+        for taken, own, other in zip(self._taken, one.part.zeros, two.part.zeros, strict=True):
+            together -= own.T @ taken @ other
         return together
+
+
+def _left(information: Array, gradient: Array, asked: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Information and gradient that are left of some columns once all others are free: Schur's complement."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    unit, pull = information * np.outer(scale, scale), gradient * scale
+    others = np.setdiff1d(np.arange(scale.size), asked)
+    across = np.linalg.solve(definite(unit[np.ix_(others, others)]), unit[np.ix_(others, asked)])
+    left = unit[np.ix_(asked, asked)] - unit[np.ix_(asked, others)] @ across
+    return left / np.outer(scale[asked], scale[asked]), (pull[asked] - across.T @ pull[others]) / scale[asked]
 
 
 def _gained(information: Array, gradient: Array) -> float:

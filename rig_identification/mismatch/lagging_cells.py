@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import Parameter, ParameterSet
 from rig_identification.mismatch.candidate import Candidate, Told
@@ -24,8 +22,8 @@ def lagging_cells(rig: Rig, parameters: ParameterSet, mass: float) -> list[Candi
         name = f"{cable.name}.load_cell_hysteresis"
         amount = Parameter(name, "N", 0.0, HYSTERESIS * share, "device", entries[name], bounded=False)
         name = f"{cable.name}.load_cell_play"
-        play = Parameter(name, "N", PLAY * share, EITHER, "device", entries[name], bounded=False)
-        out.append(_lagging(cable.name, amount, replace(play, ratio=True)))
+        play = Parameter(name, "N", PLAY * share, EITHER, "device", entries[name], bounded=False, ratio=True)
+        out.append(_lagging(cable.name, amount, play))
     return out
 
 

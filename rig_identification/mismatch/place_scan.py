@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
+from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.beyond import Beyond
-from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.candidate import Candidate, added
 from rig_identification.mismatch.places import travel_of
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
@@ -61,6 +62,15 @@ def scales_of(problem: Problem, evaluation: Evaluation, mass: float) -> Scales:
     speed = max(float(np.max(np.linalg.norm(v, axis=1))) for _, v in pairs)
     size = float(np.max(extent(rig)))
     return Scales(FORCE * mass * rig.gravity, max(travel, 1e-6), max(speed, 1e-6), size)
+
+
+def point_near_middle(stem: str, rig: Rig, std: float, place: int) -> tuple[Parameter, ...]:
+    """A point of the body, near its middle to ``std`` m. place: its first entry in the effects' block."""
+    first = layout.effects_offset(len(rig.cables)) + place
+    return tuple(
+        added(f"{stem}.point.{a}", "m", std, first + i, float(at))
+        for i, (a, at) in enumerate(zip(AXES, middle_of(rig), strict=True))
+    )
 
 
 class Shape(Protocol):

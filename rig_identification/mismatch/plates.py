@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.parameters import AXES
 from rig_identification.mismatch.candidate import Candidate, added
-from rig_identification.mismatch.place_scan import Scales, direction
-from rig_identification.mismatch.riders import middle_of
+from rig_identification.mismatch.place_scan import Scales, direction, point_near_middle
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.effects.air_drag import AIR
@@ -51,10 +50,7 @@ class Plate:
             added(f"air.plate_{name}", "rad", FACING, block + place.AIR_PLATE_NORMAL + i, self.normal[i])
             for i, name in enumerate(("azimuth", "elevation"))
         )
-        point = tuple(
-            added(f"air_drag.point.{a}", "m", 0.3 * scales.size, block + place.AIR_PLATE_POINT + i, at)
-            for i, (a, at) in enumerate(zip(AXES, middle_of(rig), strict=True))
-        )
+        point = point_near_middle("air_drag", rig, 0.3 * scales.size, place.AIR_PLATE_POINT)
         along = added("air.plate_along", "1", 0.5, block + place.AIR_PLATE_ALONG, ALONG)
         axis = AXES[int(np.argmax(np.abs(direction(*self.normal))))]
         return Candidate(

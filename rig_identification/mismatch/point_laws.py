@@ -23,8 +23,7 @@ from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.findings import written
-from rig_identification.mismatch.place_scan import Scales, direction, followed
-from rig_identification.mismatch.riders import middle_of
+from rig_identification.mismatch.place_scan import Scales, direction, followed, point_near_middle
 from rig_identification.model import layout
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Motion, RigModel
@@ -110,10 +109,7 @@ def _law(parameters: tuple[Parameter, ...], positive: int) -> Candidate:
 
 def _point(rig: Rig, scales: Scales) -> tuple[Parameter, ...]:
     """The point of the body that the law is about."""
-    entry, middle = layout.effects_offset(len(rig.cables)) + place.LAW_POINT, middle_of(rig)
-    return tuple(
-        added(f"unknown.point.{a}", "m", scales.size, entry + i, float(middle[i])) for i, a in enumerate(AXES)
-    )
+    return point_near_middle("unknown", rig, scales.size, place.LAW_POINT)
 
 
 def _told(found: Estimates) -> Told:

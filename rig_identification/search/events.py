@@ -158,9 +158,16 @@ def explained_outside(
     evidence = evidence_of(ideal, found.fitted, after)
     gain = float(wrong(ideal.fitted) - wrong(found.fitted))
     pulse = likeliest_pulse(whole) if near_noise(whole) else None
+    seen = [event.inside(pulse) or event.pulse for event in events]
+    # A pulse is right to first order, which is near the noise
+    unseen = dict.fromkeys(e.recording for e, one in zip(events, seen, strict=True) if one is None)
+    courses = {name: _course(found.fitted, whole, name) for name in unseen}
     pushes = tuple(
-        _told(event, found.fitted, whole, pulse, {**evidence, "log_likelihood_gain": gain})
-        for event in events
+        replace(
+            _told(event, one, courses, ideal),
+            evidence=evidence | {"log_likelihood_gain": one.gain if one else gain},
+        )
+        for event, one in zip(events, seen, strict=True)
     )
     findings = (*pushes, *found.mismatch.findings) if chief else (*found.mismatch.findings, *pushes)
     outside = "the push" if len(events) == 1 else "the pushes"
@@ -170,17 +177,15 @@ def explained_outside(
 
 
 def _told(
-    event: Event, outside: Fitted, whole: Fitted, pulse: Pulse | None, evidence: dict[str, float | None]
+    event: Event, pulse: Pulse | None, courses: dict[str, MissingWrench | None], ideal: Ideal
 ) -> Finding:
-    """The event as a finding: near the noise as the likeliest ``pulse``, else as the wrench over time."""
-    seen = event.inside(pulse) or event.pulse
-    if seen is not None:
-        return replace(pulse_finding(seen), evidence={**evidence, "log_likelihood_gain": seen.gain})
-    # A pulse is right to first order, which is near the noise
-    missing = _course(outside, whole, event) or event.missing
+    """The event as a finding without evidence: as a pulse, or else as the wrench over time."""
+    if pulse is not None:
+        return pulse_finding(pulse)
+    missing = courses[event.recording] or event.missing
     if missing is None:
         raise AssertionError("an event was seen in a pulse or in a wrench")
-    return replace(push_finding(missing, whole.problem.bench.rig, event.start, event.end), evidence=evidence)
+    return push_finding(missing, ideal.fitted.problem.bench.rig, event.start, event.end)
 
 
 def _everything(found: Explained, ideal: Ideal) -> Fitted:
@@ -190,12 +195,12 @@ def _everything(found: Explained, ideal: Ideal) -> Fitted:
     return fit_whole(ideal.fitted, whole, outside.problem, outside.evaluation.point)
 
 
-def _course(outside: Fitted, whole: Fitted, event: Event) -> MissingWrench | None:
-    """What acts about an event over time, with rig and body as the rest of the session has them.
+def _course(outside: Fitted, whole: Fitted, recording: str) -> MissingWrench | None:
+    """What acts in a recording over time, with rig and body as the rest of the session has them.
 
     The wrench is as strong as its evidence asks for. None where no level can be followed.
     """
-    run = next(r for r in (*whole.problem.runs, *whole.holdout_runs) if r.recording.name == event.recording)
+    run = next(r for r in (*whole.problem.runs, *whole.holdout_runs) if r.recording.name == recording)
     theta = outside.evaluation.point.theta
     problem = replace(outside.problem, runs=(run,), rests=())
     start = launch_state(problem.bench, run, theta, outside.rest)
