@@ -25,6 +25,7 @@ import shlex
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -73,10 +74,10 @@ def command_of(page: str) -> str:
     return re.sub(r"\\\n\s*", "", line)
 
 
-def simulated(command: str, *, effect: bool = True, noise: bool = True) -> ri.Simulated:
-    """The session that a command simulates, or the same one without its effect, or without noise."""
+def simulated(command: str, *, effect: bool = True, **changes: Any) -> ri.Simulated:
+    """The session that a command simulates, or the same one without its effect, or with other arguments."""
     asked = build_parser().parse_args(shlex.split(command)[1:])
-    given = {option: getattr(asked, option) for option in OPTIONS} | {"noise": noise}
+    given = {option: getattr(asked, option) for option in OPTIONS} | changes
     if not effect and not asked.effect:
         given["pull"] = build_parser().parse_args(PLAIN).pull  # what is seen without a switch: pulled less
     return ri.simulate(effects=effects_given(asked.effect) if effect else {}, **given)
@@ -169,7 +170,10 @@ def caption(what: Shown) -> str:
                 "tolerances, and beyond three that is a finding."
             )
         else:
-            parts.append("No residual is left of that: the ten numbers and the rig's doubts take it.")
+            parts.append(
+                "No residual is left of that: the ten numbers and several small doubts of the rig take it "
+                "between them."
+            )
     else:
         parts = [
             f"{where}: {what.fit.rms_in_sigma:.1f} times the noise is left by the ideal model, in the root "
