@@ -196,7 +196,10 @@ def rivals(effect: str, gains: dict[str, float]) -> str:
     if most < SURE:
         return "Nothing is left that any hypothesis could take away."
     if own < LEAST * most:
-        return "The ideal model is too far off here for first order to compare hypotheses."
+        return (
+            "First order says little here: what the effect does is not in proportion to its amount. "
+            "The search fits it instead."
+        )
     others = {kind: g / own for kind, g in gains.items() if kind != effect and g > LEAST * own}
     if not others:
         return "To first order no other hypothesis takes as much as a fifth of it away."

@@ -148,12 +148,13 @@ def car_says(folder: Path) -> None:
 
 
 def drone_says(folder: Path) -> None:
-    """Jzz as simulated, and Jxx unobservable."""
+    """Jzz and Jxx as simulated, to some percent; Jyy hardly."""
     told = json.loads((folder / "answer" / "result.json").read_text(encoding="utf-8"))
     assert told["mismatch"]["verdict"] == "none"
-    value, std = told["inertia"]["value"][2][2], told["inertia"]["std"][2][2]
-    assert abs(value - 0.022) < 3.0 * std < 0.1 * value
-    assert {"Jxx", "Jyy"} <= set(told["unobservable"])
+    J, std = told["inertia"]["value"], told["inertia"]["std"]
+    for i, true in ((0, 0.012), (2, 0.022)):
+        assert abs(J[i][i] - true) < 4.0 * std[i][i] < 0.1 * true
+    assert J[1][1] is None or std[1][1] > 0.1 * J[1][1]
 
 
 def mystery_says(folder: Path) -> None:

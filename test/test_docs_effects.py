@@ -140,7 +140,7 @@ def test_a_picture_shows_both_courses_and_both_residuals() -> None:
     assert "angular rate y (rad/s)" in svg
     assert "3.7 times the noise is left" in caption(shown)  # (0.05 / 0.01 / sqrt 2)^2 and 1
     assert rivals("hinge_damping", gains).splitlines()[2:] == ["| [`a`](a.md) | 80 % |"]
-    assert "too far off" in rivals("b", gains)
+    assert "First order says little" in rivals("b", gains)
     assert "Nothing is left" in rivals("b", {"b": 3.0})
     # Where a number of the description takes all of it, what the effect changes is drawn instead
     taken = replace(shown, fit=replace(fit, predicted=swing))
