@@ -48,6 +48,7 @@ def _shown(output: dict[str, Any]) -> str:
     if "text/html" in data:
         # Its own style would be the whole page's; blank lines would end it
         table = re.sub(r"<style.*?</style>", "", "".join(data["text/html"]), flags=re.DOTALL)
+        table = table.replace(' border="1" class="dataframe"', "")  # the theme's own, as of other tables
         return re.sub(r"\n\s*\n+", "\n", table).strip()
     plain = "".join(data.get("text/plain", ""))
     return f"<pre>{html.escape(plain)}</pre>" if plain else ""
