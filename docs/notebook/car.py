@@ -5,7 +5,7 @@
 # are tables. A car is simulated whose hinges damp more than anybody thinks; the session is read, checked
 # and identified as a recorded one would be.
 #
-# Needs `pip install 'rig_identification[notebook]'`. The page of [Python](../how-to/python.md) explain
+# Needs `pip install 'rig_identification[notebook]'`. The page of [Python](../how-to/python.md) explains
 # each function.
 
 # %%
