@@ -26,6 +26,7 @@ from bench.effect_pages import (
 )
 from bench.effect_pictures import Shown, drawn
 from rig_identification.api.effects import effect_of
+from rig_identification.api.truth import truth_document
 from rig_identification.cli.effects import effects_given
 from rig_identification.cli.main import build_parser, main
 from rig_identification.errors import InputError
@@ -113,7 +114,10 @@ def test_a_page_simulates_its_own_effect(effect: str, monkeypatch: pytest.Monkey
     # A law of a force has no word of its own in the contract
     assert {effect_of(name) for name in given} == {"point_law" if effect == "unknown" else effect}
     # Raises where a switch is unknown or a number makes no sense
-    assert simulated(command, duration=1.0, rest=0.0).truth.effects == given
+    truth = simulated(command, duration=1.0, rest=0.0).truth
+    assert truth.effects == given
+    (told,) = truth_document(truth)["effects"]
+    assert told["switches"] == {name: list(values) for name, values in given.items()}
 
 
 def test_a_switch_that_does_not_exist_is_seen() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig_identification.api.truth import truth_document
 from rig_identification.cli.effects import effect_of, effects_document, effects_given
 from rig_identification.errors import InputError
 from rig_identification.live.plant_effects import with_effects
@@ -423,6 +424,15 @@ def test_a_body_without_its_gyroscopic_moment_turns_otherwise() -> None:
     plain, without = (recorded(car(run, effects=e)) for e in ({}, {"gyroscopic_share": (1.0,)}))
     off = np.abs(plain.imu.values[:, :3] - without.imu.values[:, :3])
     assert 0.0 < np.max(off) < 0.1 * np.max(np.abs(plain.imu.values[:, :3]))
+
+
+def test_a_law_is_told_beside_the_truth() -> None:
+    """No description has it: it was a KeyError."""
+    run, given = RunSpec("run_1", 1.0, PULL), {"cable_1.drift": (3.0,), "imu.lag": (0.01,)}
+    _, truth = simulate_session(car(run, effects=given), np.random.default_rng(0))
+    told = truth_document(truth)
+    assert told["parameters"]["cable_1.drift"] == {"value": 3.0, "described": 0.0}
+    assert {e["effect"] for e in told["effects"]} == {"unknown", "sensor_lag"}
 
 
 def test_a_law_of_what_is_not_measured_is_refused() -> None:
