@@ -8,17 +8,20 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
-from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import Ideal, Scores, fit_session, judged
 from rig_identification.estimate.solve import solve
+from rig_identification.mismatch import whole_runs
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.trial import Trial, may_be_none
-from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, pruned
+from rig_identification.mismatch.trial import Trial, is_ordinary, may_be_none
+from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, ordinary_alone, pruned
 from rig_identification.recording import Recording
+from rig_identification.result import Mismatch
 from rig_identification.simulate import simulate_session
 
 #: Turn of the inclinometer about y, rad, and what every hinge resists, N m s/rad.
@@ -118,3 +121,44 @@ def test_without_time_no_gain_is_told(both: Explained) -> None:
         for told in found.mismatch.findings:
             assert told.evidence["log_likelihood_gain"] is None
             assert told.evidence["holdout_error_after"] is not None
+
+
+def test_what_explains_a_part_has_an_amount(ideal: Ideal, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unlike_noise(fitted: Fitted) -> tuple[Scores, Mismatch]:
+        after, verdict = judged(fitted)
+        return after, replace(verdict, verdict="unexplained")
+
+    # What is left shows in none of the numbers
+    monkeypatch.setattr(whole_runs, "judged", unlike_noise)
+    monkeypatch.setattr(whole_runs, "trace_of", lambda *_: None)
+    part, _ = _with(ideal, ["inclinometer_offset inclinometer y", "hinge_damping", "hinge_friction"])
+    assert part.mismatch.verdict == "unexplained"
+    assert {f.effect for f in part.mismatch.findings} == {"inclinometer_offset", "hinge_damping"}
+    assert "hinge_friction" not in part.mismatch.explanation
+
+
+def test_what_is_ordinary_is_in_the_model_and_no_finding(ideal: Ideal) -> None:
+    """Every device follows a little late; the ideal model does not ask how late."""
+    three, _ = _with(ideal, ["inclinometer_offset inclinometer y", "hinge_damping", "sensor_lag"])
+    lag = as_fitted(three.fitted, next(t for t in three.effects if t.candidate.effect == "sensor_lag"))
+    (own,) = lag.candidate.parameters
+    assert abs(lag.values[own.name]) < 1e-3
+    assert is_ordinary(lag)
+    assert {f.effect for f in three.mismatch.findings} == {"inclinometer_offset", "hinge_damping"}
+    parameters, point = lag.problem.bench.parameters, lag.evaluation.point
+    theta = point.theta.copy()
+    theta[parameters.index_of(own.name)] = 0.02 / own.prior_std
+    late = replace(lag, evaluation=replace(lag.evaluation, point=replace(point, theta=theta)))
+    assert not is_ordinary(late)
+    # What the ideal model doubts itself is judged by its tolerance
+    others = (t for t in three.effects if t.candidate.effect != "sensor_lag")
+    assert not any(is_ordinary(as_fitted(three.fitted, t)) for t in others)
+
+
+def test_nothing_but_what_is_ordinary_is_no_finding(both: Explained) -> None:
+    assert ordinary_alone(both) is both
+    alone = replace(both, mismatch=replace(both.mismatch, findings=()))
+    told = ordinary_alone(alone).mismatch
+    assert told.verdict == "none"
+    assert "no finding" in told.explanation
+    assert ordinary_alone(replace(alone, trace=True)).mismatch.verdict == "explained"

@@ -27,6 +27,7 @@ from rig_identification.mismatch.trial import (
     Trial,
     attempt,
     beyond_doubt,
+    is_ordinary,
     mass_of,
     ordinary_errors,
     possible,
@@ -187,7 +188,7 @@ def earned(before: Standing, after: Standing) -> Standing:
 
 def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say: Say) -> list[Standing]:
     """First fits of promises, what is fitted soon before what is fitted in ten times the time."""
-    asked = list(_with_twins(sorted(promises, key=lambda p: p.candidate.slow)))
+    asked = list(_with_twins(sorted(promises, key=lambda p: p.candidate.slow), standing.found))
     first: list[Standing] = []
     kept = 0.0
     for k, promise in enumerate(asked):
@@ -298,12 +299,15 @@ def special_cases(candidate: Candidate, others: list[Candidate]) -> list[Candida
 
 
 def makes_sense(standing: Standing, problem: Problem) -> bool:
-    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary.
+    """Whether the last effect has an amount and a place that it can have, beyond what the ideal model has.
 
-    problem: without any effect.
+    What is ordinary and not in the ideal model makes sense, and is no finding (whole_runs.py). problem:
+    without any effect.
     """
     trial = _last_of(standing)
-    return possible(trial) and beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
+    if not possible(trial):
+        return False
+    return is_ordinary(trial) or beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
 
 
 def _last_of(standing: Standing) -> Trial:
@@ -312,12 +316,13 @@ def _last_of(standing: Standing) -> Trial:
     return Trial(standing.found[-1], rung.problem, rung.evaluation, standing.evidence, settled=True)
 
 
-def _with_twins(promises: list[Promise]) -> Iterator[Promise]:
-    """What is fitted: each promise, and what first order cannot tell from it."""
+def _with_twins(promises: list[Promise], found: tuple[Candidate, ...]) -> Iterator[Promise]:
+    """What is fitted: each promise, and its twins to first order that can stand beside ``found``."""
     for promise in promises:
         yield promise
         for candidate, values in promise.candidate.twins:
-            yield replace(promise, candidate=candidate, values=values, elsewhere=())
+            if compatible([candidate], list(found)):
+                yield replace(promise, candidate=candidate, values=values, elsewhere=())
 
 
 def worthy(promises: list[Promise], count: int) -> list[Promise]:
