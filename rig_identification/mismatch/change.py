@@ -86,7 +86,7 @@ class Change:
         )
 
     def possible(self, found: Estimates) -> bool:
-        """Whether what cannot be negative is not, after any of its steps. found: estimates of a fit with it."""
+        """Whether what cannot be negative is not, after any of its steps. found: a fit with it."""
         base = self.group.of
         if base is None or base.positive == 0:
             return True
