@@ -59,13 +59,13 @@ class Asked(NamedTuple):
 def changes_of(fitted: Fitted, first: Rung) -> Asked:
     """Changes that may be what is wrong.
 
-    first: the model at its own level. Where that needs no wrench held-out runs are asked as well. The likeliest
-    change leads where it adds more to the log evidence than anything that is wrong all the time: what swings
-    all the time looks like a load that changes several times. What swings or pulls, at any frequency or place,
-    takes longest to ask, and comes last; not at all where the change has the larger part of what is wrong.
-    Beside a wrench, about a body that is bent to all of it, first order ranks the same numbers over time; which
-    ones they are a fit has to say. So a change that adds more than the same numbers wrong all the time is worth
-    one, though something else leads.
+    first: the model at its own level. Where that needs no wrench held-out runs are asked as well. The
+    likeliest change leads where it adds more to the log evidence than anything that is wrong all the time:
+    what swings all the time looks like a load that changes several times. What swings or pulls, at any
+    frequency or place, takes longest to ask, and comes last; not at all where the change has the larger part
+    of what is wrong. Beside a wrench, about a body that is bent to all of it, first order ranks the same
+    numbers over time; which ones they are a fit has to say. So a change that adds more than the same numbers
+    wrong all the time is worth one, though something else leads.
     """
     seen = _linearised(fitted, first)
     if seen is None:
