@@ -31,9 +31,7 @@ LEADER = 1  # constant: number of the coordinate that holds what those of one ma
 AXIS = 2  # 3: direction, in body (rider) or world (ceiling)
 MASS = 5  # kg (rider)
 POINT = 6  # 3: m, body: where a rider rests
-SPREAD = (
-    6  # 3: m^2 (turning): inertia about its centre per mass, x, y, z against AXIS; see effects/turning.py
-)
+INERTIA = 6  # 3: kg m^2 (turning), of a rider about its centre, x, y, z against AXIS (effects/turning.py)
 HINGE = 6  # constant (ceiling): 0 moves all upper hinges, i + 1 that of cable i alone
 FREQUENCY = 9  # Hz
 DAMPING_RATIO = 10
