@@ -275,16 +275,14 @@ def test_four_wheels_are_one_part_that_turns() -> None:
     one = np.concatenate(
         [rider(40.0, middle, AXES[2:], 2.0, 0.1), turning(np.array([0, 1]), inertia, 2.0, 0.1)]
     )
-    # The ten numbers count four wheels at their places, and one part in their middle
-    part = model.with_internal(one)
-    start, drive = thesis_case_14().start, driven(201, 0.01, 5)
+    drive = driven(61, 0.01, 5)
     small = replace(drive, force=0.1 * drive.force)
-    outputs = [
-        simulate(m, start.moved(np.zeros(m.states)), small).outputs[:, layout.OUT_RATE :]
-        for m in (wheels, part, model.with_internal(one[:1]))
-    ]
+    outputs = []
+    for m in (wheels, model.with_internal(one), model.with_internal(one[:1])):
+        rest = find_rest(m, design_pose(m)).state
+        outputs.append(simulate(m, rest, small).outputs[:, layout.OUT_RATE :])
     apart = [float(np.max(np.abs(o - outputs[0]))) for o in outputs[1:]]
-    assert apart[0] < 0.02 * apart[1]
+    assert apart[0] < 1e-3 * apart[1]
 
 
 def test_a_turning_part_keeps_its_energy() -> None:
@@ -303,7 +301,7 @@ def test_a_turning_part_keeps_its_energy() -> None:
     for size in (0.02, 0.01):
         start = find_rest(model, design_pose(model)).state
         start = start.moved(np.concatenate([np.zeros(15), size * np.array([1.0, -0.7, 0.5]), np.zeros(6)]))
-        motion = simulate(model, start, Input.none(301, 0.01), substeps=10)
+        motion = simulate(model, start, Input.none(61, 0.01), substeps=4)
         q, speed, w = motion.states[:, 15:18], motion.states[:, 21:24], motion.states[:, 9:12]
         total = energy(model, motion)
         spring = (2.0 * np.pi * 3.0) ** 2 * np.diag(inertia)
