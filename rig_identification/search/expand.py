@@ -99,7 +99,7 @@ def children(
         promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
         promises += promised_laws(rung, standing.found)
     promised_here = worthy(promises, count_of(candidates))
-    taut = [] if rung.alone else _stretching(standing, misfit(rung.evaluation) > NEAR_SQUARE, budget, say)
+    taut = [] if rung.alone else _stretching(standing, budget, say)
     led = _led_by(problem, standing, taut, promised_here, budget, say)
     if led:
         return led
@@ -252,8 +252,8 @@ def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: 
     return _first_fits(standing, worthy(promises, len(promises)), budget, say)
 
 
-def _stretching(standing: Standing, soft: bool, budget: Budget, say: Say) -> list[Standing]:
-    """The best first fit of cables that stretch, as wire does or, if ``soft``, as rope of any kind does.
+def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
+    """The best first fit of cables that stretch: as wire, or as rope where the wrench leaves some of it.
 
     With a wrench what rings is told by its forces. But cables that stretch let the body move where no force
     could move it, and the rig's geometry and the wrench bend to that: first order promised 92 nats of the
@@ -264,7 +264,7 @@ def _stretching(standing: Standing, soft: bool, budget: Budget, say: Say) -> lis
     mass = mass_of(rung.problem, rung.evaluation)
     *ropes, wire = stiffnesses(rig, mass)
     starts = [Promise(c, 0.0, {TAUT: 1.0 / wire}) for c in taut_cables(rig, model, mass)]
-    if soft and not gives_way(model):
+    if misfit(rung.evaluation) > NEAR_SQUARE and not gives_way(model):
         elastic = cable_elasticity(rig, model, mass)
         starts += [Promise(elastic, 0.0, {STIFFNESS: amount}) for amount in ropes]
     found = [begun_with(standing, start, budget, say) for start in starts if not budget.spent()]
