@@ -152,15 +152,16 @@ def turning_too(problem: Problem, beyond: Beyond, ridden: Ridden, mass: float) -
     def of(turning: list[int]) -> Best | None:
         matrix = np.zeros((1 + len(turning), TERMS, 1 + len(turning), TERMS))
         right = np.zeros((1 + len(turning), TERMS))
-        chosen = [slice(TERMS), *[[TERMS + k] for k in turning]]
+        chosen = [np.arange(TERMS), *(np.array([TERMS + k]) for k in turning)]
         for i, a in enumerate(chosen):
-            right[i, : 1 if i else TERMS] = every.right[a]
+            right[i, : a.size] = every.right[a]
             for j, b in enumerate(chosen):
-                matrix[i, : 1 if i else TERMS, j, : 1 if j else TERMS] = information[a][:, b]
+                matrix[i, : a.size, j, : b.size] = information[np.ix_(a, b)]
         count = 1 + len(turning)
         return best_place(matrix, right, precision[:count], count, 1.0, REACH)
 
-    best, chosen = ridden.best, []
+    best = ridden.best
+    chosen: list[int] = []
     for _ in AXES:
         left = [k for k in range(len(AXES) * len(SPARSE)) if k // len(SPARSE) not in _axes_of(chosen)]
         tried = [(found.gain, k) for k in left if (found := of([*chosen, k])) is not None]
@@ -235,7 +236,7 @@ def turning_ways(problem: Problem, beyond: Beyond, damping: float) -> Turned:
     information, right = found.information(responses), found.right
 
     def of(columns: list[int]) -> tuple[float, Array]:
-        amounts = np.linalg.solve(information[np.ix_(columns, columns)], right[columns])
+        amounts: Array = np.asarray(np.linalg.solve(information[np.ix_(columns, columns)], right[columns]))
         return (0.5 * float(amounts @ right[columns]) if np.all(amounts > 0.0) else 0.0), amounts
 
     chosen: list[int] = []
