@@ -223,8 +223,8 @@ class Turned:
     inertia: dict[str, float]  # kg m^2 about its own centre, by axis
 
 
-def turning_ways(problem: Problem, beyond: Beyond, damping: float) -> Turned:
-    """About which axes a part turns, and with which frequencies, as far as each of them explains some.
+def turning_ways(problem: Problem, beyond: Beyond, damping: float, known: str) -> Turned:
+    """About which axes but those ``known`` a part turns, and how fast, as far as each explains some.
 
     One axis after the other, from the one that explains most by itself. damping: ratio.
     """
@@ -242,7 +242,10 @@ def turning_ways(problem: Problem, beyond: Beyond, damping: float) -> Turned:
     chosen: list[int] = []
     gain, amounts = 0.0, np.zeros(0)
     for _ in AXES:
-        left = [k for k in range(len(AXES) * each) if k // each not in {c // each for c in chosen}]
+        taken = {AXES.index(a) for a in known} | {c // each for c in chosen}
+        left = [k for k in range(len(AXES) * each) if k // each not in taken]
+        if not left:
+            break
         more, best = max((of([*chosen, k])[0], k) for k in left)
         if more - gain < needed:
             break

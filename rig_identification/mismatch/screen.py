@@ -28,7 +28,6 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.rider_places import (
     Ridden,
-    Turned,
     columns_of,
     finer,
     on_springs_all_ways,
@@ -362,18 +361,19 @@ def _more_ways(
         return []
     amount, at = values[f"{effect}.mass"], np.array([values[f"{effect}.position.{a}"] for a in AXES])
     have = {a: values[f"{effect}.frequency.{a}" if swing.along else f"{effect}.frequency"] for a in known}
-    turning = tuple((a, values[f"{effect}.turning_frequency.{a}"]) for a, _ in swing.turning)
+    turning = {a: values[f"{effect}.turning_frequency.{a}"] for a, _ in swing.turning}
     damping = values[f"{effect}.damping_ratio"]
     asked: list[tuple[float, Swing, dict[str, float]]] = []
     ways = other_ways(problem, opened[1], known, amount, at)
     if ways:
         frequencies = {a: ways[a][0] if a in ways else have[a] for a in AXES if a in ways or a in have}
         along = tuple(frequencies.values())
-        moving = Swing("".join(frequencies), min(along), along, turning)
+        moving = Swing("".join(frequencies), min(along), along, tuple(turning.items()))
         asked.append((sum(gain for _, gain in ways.values()), moving, {}))
-    turned = Turned(0.0, {}, {}) if turning else turning_ways(problem, opened[1], damping)
+    turned = turning_ways(problem, opened[1], damping, "".join(turning))
     if turned.inertia:
-        moving = replace(swing, turning=tuple(turned.frequency.items()))
+        about = turning | turned.frequency
+        moving = replace(swing, turning=tuple((a, about[a]) for a in AXES if a in about))
         moving = replace(
             moving, **({"along": tuple(have.values())} if swing.along else {"frequency": have[known]})
         )
