@@ -272,6 +272,7 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, level))
     monkeypatch.setattr(expand, "_closer", lambda *_: [])
     monkeypatch.setattr(expand, "_giving_way", lambda *_: [])
+    monkeypatch.setattr(expand, "_stretching", lambda *_: [])
     monkeypatch.setattr(expand, "_clocks_and_lags", lambda ranked: ranked)
     monkeypatch.setattr(expand, "_last_of", lambda child: SimpleNamespace(candidate=child.found[-1]))
     monkeypatch.setattr(expand, "makes_sense", lambda standing, ordinary: True)
@@ -287,3 +288,27 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
         promises,
     )
     assert [child.label for child in found] == ["lag"]
+
+
+@pytest.mark.parametrize(("gain", "leaves", "led"), [(120.0, 5, True), (80.0, 5, False), (120.0, 8, False)])
+def test_what_else_is_there_is_asked_beside_cables_that_stretch(
+    monkeypatch: pytest.MonkeyPatch, gain: float, leaves: int, led: bool
+) -> None:
+    """Where they gain what anything promises; not where they leave nothing, and others are their rivals."""
+
+    def down(model: object, point: object, level: int) -> object:
+        return replace(_model("cables", gain, leaves).rung)
+
+    monkeypatch.setattr(expand, "walked_down", down)
+    monkeypatch.setattr(expand, "_closer", lambda *_: [])
+    monkeypatch.setattr(expand, "makes_sense", lambda standing, problem: True)
+    taut = _model("cables", gain, 4)
+    found = expand._led_by(
+        None,  # type: ignore[arg-type]
+        _model("", 0.0, 4),
+        [taut],
+        [promise("mass", 100.0)],
+        UNLIMITED,
+        lambda label: None,
+    )
+    assert [child.label for child in found] == (["cables"] if led else [])

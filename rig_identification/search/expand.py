@@ -99,8 +99,12 @@ def children(
         promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
         promises += promised_laws(rung, standing.found)
     promised_here = worthy(promises, count_of(candidates))
-    first = _first_fits(standing, promised_here, budget, say)
-    first += _giving_way(standing, first, budget, say)
+    taut = [] if rung.alone else _stretching(standing, budget, say)
+    led = _led_by(problem, standing, taut, promised_here, budget, say)
+    if led:
+        return led
+    first = _first_fits(standing, promised_here, budget, say) + taut
+    first += _giving_way(standing, first, budget, say) if rung.alone else []
     first += _alike(standing, first, left, budget, say)
     first = [child for child in first if not contradicted(_last_of(child))]
     first.sort(key=lambda child: -child.rung.within_reach)
@@ -124,6 +128,31 @@ def children(
         walked += _unbent(standing, left, promised_here, budget, say)
     sensible = (earned(standing, s) for s in walked if makes_sense(s, problem))
     return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
+
+
+def _led_by(
+    problem: Problem,
+    standing: Standing,
+    taut: list[Standing],
+    promises: list[Promise],
+    budget: Budget,
+    say: Say,
+) -> list[Standing]:
+    """Cables that stretch at their level, where they gain what anything else promises and leave something.
+
+    All cables stretch, and what else is there is there beside that. It is asked beside them: without them in
+    the model it bends to what they do to the tensions, and its fits cost several times theirs. Where they
+    leave nothing, or make no sense, they are one hypothesis of others. taut: their first fit.
+    """
+    if not taut or _gain(standing, taut[0]) < max((p.gain for p in promises), default=np.inf):
+        return []
+    begun = taut[0].rung
+    down = walked_down(begun.model, begun.evaluation.point, begun.level)
+    if down is None or down.alone:
+        return []
+    led = replace(taut[0], rung=down)
+    every = [s for s in (led, *_closer(problem, led, budget, say)) if makes_sense(s, problem)]
+    return sorted(every, key=lambda s: -s.evidence)
 
 
 def _gain(standing: Standing, child: Standing) -> float:
@@ -208,19 +237,13 @@ def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say
 
 
 def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: Say) -> list[Standing]:
-    """First fits of what gives way, of which first order says nothing where it rings.
+    """First fits of what gives way beside no wrench, where first order says nothing of what rings.
 
-    Without a wrench in the model it is scanned by its amount, where the residuals as a whole show something
-    and nothing that was fitted takes the larger part away. With a wrench what rings is told by its forces.
-    But cables that stretch let the body move where no force could move it, and the rig's geometry and the
-    wrench bend to that: first order promised 92 nats of the 17,000 that they explain of a car on wires. So
-    they are begun, whatever is promised: as wire does, and as softer rope where the wrench does not account
-    for what is measured.
+    It is scanned by its amount, where the residuals as a whole show something and nothing that was fitted
+    takes the larger part away.
     """
     rung = standing.rung
     before = rung.evaluation
-    if not rung.alone:
-        return _stretching(standing, misfit(before) > NEAR_SQUARE, budget, say)
     taken = any(excess(child.rung.evaluation) < CHIEF * excess(before) for child in first)
     if taken or not shows(before) or budget.spent():
         return []
@@ -229,14 +252,19 @@ def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: 
     return _first_fits(standing, worthy(promises, len(promises)), budget, say)
 
 
-def _stretching(standing: Standing, soft: bool, budget: Budget, say: Say) -> list[Standing]:
-    """The best first fit of cables that stretch, as wire does or, if ``soft``, as rope of any kind does."""
+def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
+    """The best first fit of cables that stretch: as wire, or as rope where the wrench leaves some of it.
+
+    With a wrench what rings is told by its forces. But cables that stretch let the body move where no force
+    could move it, and the rig's geometry and the wrench bend to that: first order promised 92 nats of the
+    17,000 that they explain of a car on wires. So they are begun, whatever is promised.
+    """
     rung = standing.rung
     rig, model = rung.problem.bench.rig, rung.problem.bench.parameters.model
     mass = mass_of(rung.problem, rung.evaluation)
     *ropes, wire = stiffnesses(rig, mass)
     starts = [Promise(c, 0.0, {TAUT: 1.0 / wire}) for c in taut_cables(rig, model, mass)]
-    if soft and not gives_way(model):
+    if misfit(rung.evaluation) > NEAR_SQUARE and not gives_way(model):
         elastic = cable_elasticity(rig, model, mass)
         starts += [Promise(elastic, 0.0, {STIFFNESS: amount}) for amount in ropes]
     found = [begun_with(standing, start, budget, say) for start in starts if not budget.spent()]
