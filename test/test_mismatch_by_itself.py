@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from test_simulate_identify import shaken
 
-from rig_identification.estimate.identify import Ideal, fit_session, judged
+from rig_identification.estimate.fitted import Fitted
+from rig_identification.estimate.identify import Ideal, Scores, fit_session, judged
 from rig_identification.estimate.solve import solve
+from rig_identification.mismatch import whole_runs
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.candidate import Candidate
@@ -19,6 +21,7 @@ from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.trial import Trial, may_be_none
 from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, pruned
 from rig_identification.recording import Recording
+from rig_identification.result import Mismatch
 from rig_identification.simulate import simulate_session
 
 #: Turn of the inclinometer about y, rad, and what every hinge resists, N m s/rad.
@@ -118,3 +121,17 @@ def test_without_time_no_gain_is_told(both: Explained) -> None:
         for told in found.mismatch.findings:
             assert told.evidence["log_likelihood_gain"] is None
             assert told.evidence["holdout_error_after"] is not None
+
+
+def test_what_explains_a_part_has_an_amount(ideal: Ideal, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unlike_noise(fitted: Fitted) -> tuple[Scores, Mismatch]:
+        after, verdict = judged(fitted)
+        return after, replace(verdict, verdict="unexplained")
+
+    # What is left shows in none of the numbers
+    monkeypatch.setattr(whole_runs, "judged", unlike_noise)
+    monkeypatch.setattr(whole_runs, "trace_of", lambda *_: None)
+    part, _ = _with(ideal, ["inclinometer_offset inclinometer y", "hinge_damping", "hinge_friction"])
+    assert part.mismatch.verdict == "unexplained"
+    assert {f.effect for f in part.mismatch.findings} == {"inclinometer_offset", "hinge_damping"}
+    assert "hinge_friction" not in part.mismatch.explanation

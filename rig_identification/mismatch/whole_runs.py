@@ -99,7 +99,11 @@ def fitted_whole(
         told, text = "explained", f"{effects} explains all but a trace. {errors} {verdict.explanation}"
     else:
         told = "unexplained"
-        text = f"{effects} explains part of it; something is left. {verdict.explanation}"
+        # An amount that may as well be none bends to what is left, and tells nothing of it
+        findings = tuple(
+            f for f, t in zip(findings, found, strict=True) if not may_be_none(as_fitted(fitted, t))
+        )
+        text = f"{effects_of(findings) or 'Nothing'} explains part of it; something is left. {verdict.explanation}"
     mismatch = Mismatch(told, text, findings, named.rivals)
     outcome = Explained(
         fitted, mismatch, ideal, loose, trace, named.bodies, can_be, tuple(found), named.problem

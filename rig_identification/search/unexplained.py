@@ -98,7 +98,9 @@ def without_device(ideal: Ideal, device: str, notify: Notify) -> Ideal | None:
 def _partly(outcome: Outcome) -> Explained | None:
     """Whole runs with the likeliest effects, where these take nearly all of what is left away."""
     best, first = outcome.partly, outcome.first.rung
-    if best is None or not best.possible or misfit(best.fitted.evaluation) > WRONG:
+    if best is None or not best.possible or not best.mismatch.findings:
+        return None
+    if misfit(best.fitted.evaluation) > WRONG:
         return None
     weaker = outcome.likeliest.rung.level - first.level
     return best if weaker >= WEAKER and not hear(best.fitted).contradicted else None
