@@ -103,7 +103,8 @@ def fitted_whole(
         findings = tuple(
             f for f, t in zip(findings, found, strict=True) if not may_be_none(as_fitted(fitted, t))
         )
-        text = f"{effects_of(findings) or 'Nothing'} explains part of it; something is left. {verdict.explanation}"
+        effects = effects_of(findings) or "Nothing"
+        text = f"{effects} explains part of it; something is left. {verdict.explanation}"
     mismatch = Mismatch(told, text, findings, named.rivals)
     outcome = Explained(
         fitted, mismatch, ideal, loose, trace, named.bodies, can_be, tuple(found), named.problem

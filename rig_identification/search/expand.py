@@ -377,11 +377,11 @@ def _entered(
 
 
 def described_closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> list[Standing]:
-    """A model that needs no wrench, with closer descriptions of its effects that are likelier, likeliest first.
+    """A model that needs no wrench with closer descriptions of its effects; those that are likelier, best first.
 
-    They are asked where whole runs show that something is left: of a model that leaves noise a closer
-    description gains next to nothing, and its fit costs as much as the first one's (7 nats of 82,000, and half of
-    the work, for the third axis that a car's wheels turn about together). problem: without any effect.
+    They are asked where whole runs show that something is left. Of a model that leaves noise a closer
+    description gains next to nothing, and its fit costs as much as the first one's: 7 nats of 82,000 and half
+    of the work for the third axis that a car's wheels turn about. problem: without any effect.
     """
     if not standing.rung.alone:
         # Those were asked on the way to its level
