@@ -377,7 +377,7 @@ def _entered(
 
 
 def described_closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> list[Standing]:
-    """A model that needs no wrench with closer descriptions of its effects; those that are likelier, best first.
+    """A model that needs no wrench, with likelier closer descriptions of its effects, the likeliest first.
 
     They are asked where whole runs show that something is left. Of a model that leaves noise a closer
     description gains next to nothing, and its fit costs as much as the first one's: 7 nats of 82,000 and half
