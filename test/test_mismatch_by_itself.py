@@ -18,8 +18,8 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.trial import Trial, may_be_none
-from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, pruned
+from rig_identification.mismatch.trial import Trial, is_ordinary, may_be_none
+from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, ordinary_alone, pruned
 from rig_identification.recording import Recording
 from rig_identification.result import Mismatch
 from rig_identification.simulate import simulate_session
@@ -135,3 +135,30 @@ def test_what_explains_a_part_has_an_amount(ideal: Ideal, monkeypatch: pytest.Mo
     assert part.mismatch.verdict == "unexplained"
     assert {f.effect for f in part.mismatch.findings} == {"inclinometer_offset", "hinge_damping"}
     assert "hinge_friction" not in part.mismatch.explanation
+
+
+def test_what_is_ordinary_is_in_the_model_and_no_finding(ideal: Ideal) -> None:
+    """Every device follows a little late; the ideal model does not ask how late."""
+    three, _ = _with(ideal, ["inclinometer_offset inclinometer y", "hinge_damping", "sensor_lag"])
+    lag = as_fitted(three.fitted, next(t for t in three.effects if t.candidate.effect == "sensor_lag"))
+    (own,) = lag.candidate.parameters
+    assert abs(lag.values[own.name]) < 1e-3
+    assert is_ordinary(lag)
+    assert {f.effect for f in three.mismatch.findings} == {"inclinometer_offset", "hinge_damping"}
+    parameters, point = lag.problem.bench.parameters, lag.evaluation.point
+    theta = point.theta.copy()
+    theta[parameters.index_of(own.name)] = 0.02 / own.prior_std
+    late = replace(lag, evaluation=replace(lag.evaluation, point=replace(point, theta=theta)))
+    assert not is_ordinary(late)
+    # What the ideal model doubts itself is judged by its tolerance
+    others = (t for t in three.effects if t.candidate.effect != "sensor_lag")
+    assert not any(is_ordinary(as_fitted(three.fitted, t)) for t in others)
+
+
+def test_nothing_but_what_is_ordinary_is_no_finding(both: Explained) -> None:
+    assert ordinary_alone(both) is both
+    alone = replace(both, mismatch=replace(both.mismatch, findings=()))
+    told = ordinary_alone(alone).mismatch
+    assert told.verdict == "none"
+    assert "no finding" in told.explanation
+    assert ordinary_alone(replace(alone, trace=True)).mismatch.verdict == "explained"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.growing import misfit
 from rig_identification.mismatch.budget import UNLIMITED
-from rig_identification.mismatch.point_laws import parts_of
+from rig_identification.mismatch.findings import finding
+from rig_identification.mismatch.point_laws import law_finding, parts_of
 from rig_identification.model.effects import place
 from rig_identification.model.motion import Input, Motion, RigModel, simulate
 from rig_identification.search.expand import Standing, children
@@ -149,3 +151,11 @@ def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float,
     truth = max(max(v) for n, v in effects.items() if n in ("point_law.spring", "point_law.brake"))
     assert abs(value - truth) < 4.0 * std
     assert std < 0.2 * truth
+    fitted = SimpleNamespace(problem=trial.problem, evaluation=trial.evaluation)
+    plain = finding(trial, estimates(trial.problem, trial.evaluation), {})
+    named = law_finding(fitted, trial.candidate, plain)  # type: ignore[arg-type]
+    # A force against the square of speed has a name in the contract; a spring that hardens has none
+    assert named.effect == ("air_drag" if part == "quadratic_damping" else "unknown")
+    if named.effect == "air_drag":
+        assert float(named.parameters["drag_area"]["value"]) == pytest.approx(value / 0.6)  # type: ignore[arg-type]
+        assert "drag of the air" in named.statement

@@ -58,11 +58,13 @@ def searched(
     traced: tuple[str, ...] = (),
     budget: Budget = UNLIMITED,
     beside: Tree | None = None,
+    longer: dict[str, tuple[float, int]] | None = None,
 ) -> tuple[queue.Outcome, list[str], list[str]]:
     """What a search comes to where models have these children; what it expands, and what it asks whole runs.
 
     tree: of each model its children (names, log evidence, level). explained: models that explain all;
     traced: those that leave a trace. beside: of each rival of a first effect itself with the second one.
+    longer: log evidence and level over whole runs of models that a stretch leaves nothing to ask of.
     """
     expanded: list[str] = []
     whole: list[str] = []
@@ -88,6 +90,19 @@ def searched(
     monkeypatch.setattr(queue, "crossed", crossed)
     monkeypatch.setattr(queue, "in_whole_runs", in_whole_runs)
     monkeypatch.setattr(queue, "stretch_of", lambda rung: rung)
+
+    def grown(whole: object, found: tuple[Candidate, ...], part: object) -> object:
+        over_whole = (longer or {}).get(" ".join(c.effect for c in found))
+        return None if over_whole is None or not whole_runs_left(found) else _Rung(*over_whole)
+
+    asked: set[str] = set()
+
+    def whole_runs_left(found: tuple[Candidate, ...]) -> bool:
+        """Once of each: then they are what is looked at."""
+        names = " ".join(c.effect for c in found)
+        return not (names in asked or asked.add(names))
+
+    monkeypatch.setattr(queue, "grown", grown)
     monkeypatch.setattr(queue, "problem_of", lambda ideal: None)
     monkeypatch.setattr(queue, "catalogue", lambda problem: [_candidate("a")])
     first = _Rung(0.0, 0)
@@ -105,6 +120,16 @@ def test_the_likeliest_model_is_expanded_until_whole_runs_are_explained(
     assert whole == ["a c"]
     assert found.told is found.partly
     assert found.told is not None
+    assert found.likeliest.label == "a, c"
+
+
+def test_what_explains_a_stretch_and_not_whole_runs_is_expanded_over_these(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tree = {"": [("a", 100.0, ALONE), ("b", 80.0, ALONE)], "a": [("a c", 900.0, ALONE)]}
+    found, expanded, whole = searched(monkeypatch, tree, ("a c",), longer={"a": (700.0, 5)})
+    assert expanded == ["", "a"]
+    assert whole == ["a", "a c"]
     assert found.likeliest.label == "a, c"
 
 
@@ -290,11 +315,14 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     assert [child.label for child in found] == ["lag"]
 
 
-@pytest.mark.parametrize(("gain", "leaves", "led"), [(120.0, 5, True), (80.0, 5, False), (120.0, 8, False)])
+@pytest.mark.parametrize(
+    ("gain", "leaves", "beside", "led"),
+    [(120.0, 5, 130.0, True), (80.0, 5, 130.0, False), (120.0, 8, 130.0, False), (120.0, 5, 70.0, False)],
+)
 def test_what_else_is_there_is_asked_beside_cables_that_stretch(
-    monkeypatch: pytest.MonkeyPatch, gain: float, leaves: int, led: bool
+    monkeypatch: pytest.MonkeyPatch, gain: float, leaves: int, beside: float, led: bool
 ) -> None:
-    """Where they gain what anything promises; not where they leave nothing, and others are their rivals."""
+    """Where they gain what anything promises, and more is promised beside them; not where nothing is left."""
 
     def down(model: object, point: object, level: int) -> object:
         return replace(_model("cables", gain, leaves).rung)
@@ -302,13 +330,17 @@ def test_what_else_is_there_is_asked_beside_cables_that_stretch(
     monkeypatch.setattr(expand, "walked_down", down)
     monkeypatch.setattr(expand, "_closer", lambda *_: [])
     monkeypatch.setattr(expand, "makes_sense", lambda standing, problem: True)
+    about = [promise("mass", beside)]
+    monkeypatch.setattr(expand, "_screened", lambda *_: about)
     taut = _model("cables", gain, 4)
     found = expand._led_by(
         None,  # type: ignore[arg-type]
         _model("", 0.0, 4),
         [taut],
         [promise("mass", 100.0)],
+        [],
         UNLIMITED,
         lambda label: None,
     )
     assert [child.label for child in found] == (["cables"] if led else [])
+    assert [child.promises for child in found] == ([tuple(about)] if led else [])

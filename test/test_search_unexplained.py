@@ -27,16 +27,18 @@ def partly(
     left: float = 1.2,
     weaker: int = WEAKER,
     contradicted: bool = False,
+    named: bool = True,
 ) -> bool:
     """Whether names are told that leave so much, and make the wrench weaker by so many levels."""
     monkeypatch.setattr(unexplained, "misfit", lambda evaluation: left)
     monkeypatch.setattr(unexplained, "hear", lambda fitted: SimpleNamespace(contradicted=contradicted))
-    found = SimpleNamespace(possible=possible, fitted=SimpleNamespace(evaluation=None))
+    told = SimpleNamespace(findings=("named",) if named else ())
+    found = SimpleNamespace(possible=possible, fitted=SimpleNamespace(evaluation=None), mismatch=told)
     first, likeliest = (SimpleNamespace(rung=SimpleNamespace(level=level)) for level in (1, 1 + weaker))
     outcome = SimpleNamespace(partly=found, first=first, likeliest=likeliest)
-    told = _partly(outcome)  # type: ignore[arg-type]
-    assert told in (None, found)
-    return told is found
+    partial = _partly(outcome)  # type: ignore[arg-type]
+    assert partial in (None, found)
+    return partial is found
 
 
 def test_names_are_told_beside_which_next_to_nothing_is(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,8 +47,9 @@ def test_names_are_told_beside_which_next_to_nothing_is(monkeypatch: pytest.Monk
     # They bend to what is none of them: the wrench stays
     assert not partly(monkeypatch, weaker=WEAKER - 1)
     assert not partly(monkeypatch, contradicted=True)
-    # Less than nothing of an amount
+    # Less than nothing of an amount, or none
     assert not partly(monkeypatch, possible=False)
+    assert not partly(monkeypatch, named=False)
     nothing = SimpleNamespace(partly=None, first=SimpleNamespace(rung=None))
     assert _partly(nothing) is None  # type: ignore[arg-type]
 

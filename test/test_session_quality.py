@@ -252,7 +252,7 @@ def test_channels_that_measure_nothing(tmp_path: Path) -> None:
     def edit(topic: str, index: int, message: Any) -> Any:
         if topic not in (CABLE, "/rig/exciter/wrench"):
             return message
-        force = dataclasses.replace(message.wrench.force, z=nothing)
+        force = dataclasses.replace(message.wrench.force, x=nothing, y=nothing, z=nothing)
         return dataclasses.replace(message, wrench=dataclasses.replace(message.wrench, force=force))
 
     written, read = read_edited(tmp_path, edit)
@@ -263,6 +263,22 @@ def test_channels_that_measure_nothing(tmp_path: Path) -> None:
         assert account(read, topic).used == 0
         assert "not measured" in account(read, topic).notes[0]
     assert_subset(read.imu, written.imu, set())
+
+
+def test_an_exciter_without_a_cell_along_an_axis(tmp_path: Path) -> None:
+    def edit(topic: str, index: int, message: Any) -> Any:
+        if topic != "/rig/exciter/wrench":
+            return message
+        force = dataclasses.replace(message.wrench.force, z=float("nan"))
+        return dataclasses.replace(message, wrench=dataclasses.replace(message.wrench, force=force))
+
+    written, read = read_edited(tmp_path, edit)
+    assert written.exciter_force is not None
+    assert read.exciter_force is not None
+    assert not read.exciter_unmeasured
+    assert np.all(read.exciter_force.values[:, 2] == 0.0)
+    assert np.array_equal(read.exciter_force.values[:, :2], written.exciter_force.values[:, :2])
+    assert account(read, "/rig/exciter/wrench").notes == ("force z: not measured, taken as zero",)
 
 
 def test_a_cable_that_the_description_does_not_know(tmp_path: Path) -> None:

@@ -125,6 +125,8 @@ def _clean(
         values = _with_unit_quaternions(values)
     held = _filled(values) if moving and topic.channel in IN_PART else []
     values[:, held] = np.nan
+    none = _without_cell(values) if topic.channel == "exciter_force" else []
+    values[:, none] = 0.0
     known = np.isfinite(values)
     finite = known.any(axis=1) if topic.channel in IN_PART else known.all(axis=1)
     if not finite.any():
@@ -132,6 +134,8 @@ def _clean(
     elif held:
         names = ", ".join(_names(topic.channel)[k] for k in held)
         notes = (f"{names}: one and the same number in every message, taken as not measured",)
+    elif none:
+        notes = (f"{', '.join(_names(topic.channel)[k] for k in none)}: not measured, taken as zero",)
     elif topic.channel in COLUMNS and len(values) >= _STUCK and not _changes(values[finite]).any():
         notes = ("the values never change: the device may be stuck or switched off",)
     clipped = np.zeros(len(values), bool)
@@ -145,6 +149,15 @@ def _clean(
         topic, stamp_ns[used], np.ascontiguousarray(values[used]), count, selection, stamp_ns,
         int(np.count_nonzero(~finite)), int(np.count_nonzero(clipped)), notes, stuck,
     )  # fmt: skip
+
+
+def _without_cell(values: NDArray[np.float64]) -> list[int]:
+    """Columns of an exciter's force that never hold a number, where others do.
+
+    An exciter has a cell along each axis that it pushes along: an unbalanced mass pushes within its plane.
+    """
+    known = np.isfinite(values).any(axis=0)
+    return [int(k) for k in np.flatnonzero(~known)] if known.any() else []
 
 
 def _filled(values: NDArray[np.float64]) -> list[int]:

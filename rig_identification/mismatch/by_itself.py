@@ -67,7 +67,8 @@ def _tells(finding: Finding, trial: Trial) -> bool:
     """Whether a finding is of this trial's effect, at its place."""
     where = trial.candidate.where
     same = all(finding.where.get(key) == value for key, value in where.items() if key != "axis")
-    return finding.effect == trial.candidate.effect and same
+    own = {q.name for q in trial.candidate.parameters}
+    return same and (finding.effect == trial.candidate.effect or bool(own & finding.numbers.keys()))
 
 
 def _own_evidence(

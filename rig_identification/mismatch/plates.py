@@ -29,6 +29,8 @@ NORMALS = (
     (0.0, 0.0), (0.5 * np.pi, 0.0), (0.0, 0.5 * np.pi), (0.25 * np.pi, 0.0), (-0.25 * np.pi, 0.0),
     (0.0, 0.25 * np.pi), (0.0, -0.25 * np.pi), (0.5 * np.pi, 0.25 * np.pi), (0.5 * np.pi, -0.25 * np.pi),
 )  # fmt: skip
+#: What to do about the air.
+DRAG_ADVICE = "Keep speeds low, cover or take off what catches the air, or keep the drag in the model."
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Plate:
             (area, *angles, *point, along),
             f"The air resists at a flat side that faces {axis}, with the square of speed along that: a drag "
             "area of {value}.",
-            "Keep speeds low, cover or take off what catches the air, or keep the drag in the model.",
+            DRAG_ADVICE,
             {"channel": None, "axis": axis},
             positive=1,
             name_in_result="drag_area",

@@ -24,8 +24,10 @@ from rig_identification.estimate.prediction import model_at
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.place_scan import Scales, direction, followed, point_near_middle
+from rig_identification.mismatch.plates import DRAG_ADVICE
 from rig_identification.model import layout
 from rig_identification.model.effects import place
+from rig_identification.model.effects.air_drag import AIR
 from rig_identification.model.motion import Motion, RigModel
 from rig_identification.quantity import plain_figure, with_interval
 from rig_identification.result import Finding
@@ -264,10 +266,17 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
     place_told = ", ".join(f"{p:.2f}" if k else "any" for p, k in zip(at, known, strict=True))
     text = (
         f"A force {acts} at ({place_told}) m of the body grows {grows}{fades}: "
-        f"{plain_figure(rms)} N (root mean square), up to {plain_figure(peak)} N. {candidate.advice}"
+        f"{plain_figure(rms)} N (root mean square), up to {plain_figure(peak)} N. "
     )
     where = {**plain.where, "axis": axis, "position": [float(v) for v in at]}
-    return replace(plain, where=where, parameters=told, statement=text)
+    if parts == ["quadratic_damping"] and not {"narrow", "saturation"} & told.keys():
+        # A force against the square of speed has a name, wherever it acts
+        value, std = (float(told["quadratic_damping"][key]) / (0.5 * AIR) for key in ("value", "std"))
+        told = written({"drag_area": (value, std, "m^2")}) | told
+        where["axis"] = None
+        text += f"That is the drag of the air on {with_interval(value, std, 'm^2')}. {DRAG_ADVICE}"
+        return replace(plain, effect="air_drag", where=where, parameters=told, statement=text)
+    return replace(plain, where=where, parameters=told, statement=text + candidate.advice)
 
 
 def _force(model: RigModel, motion: Motion, at: Array) -> Array:

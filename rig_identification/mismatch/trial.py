@@ -16,6 +16,7 @@ from rig_identification.estimate.growing import (
     misfit,
     settled_starts,
 )
+from rig_identification.estimate.identify import ORDINARY
 from rig_identification.estimate.observability import invert_information
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
@@ -380,6 +381,15 @@ def beyond_doubt(trial: Trial, ordinary: dict[str, float], limit: float) -> bool
     if len(freed) < len(trial.candidate.parameters) and not trial.candidate.ordinary:
         return True
     return any(abs(values[p.name] - p.nominal) > limit * known[p.name] for p in freed)
+
+
+def is_ordinary(trial: Trial) -> bool:
+    """Whether it is an error that the ideal model does not know, and no larger than every such rig has it.
+
+    Devices' clocks differ by tolerances, and by as much some follow late. That is no finding, and belongs in
+    the model all the same: without it no residual of a sharp sensor is noise.
+    """
+    return bool(trial.candidate.ordinary) and not beyond_doubt(trial, {}, ORDINARY)
 
 
 def strength(trial: Trial, ordinary: dict[str, float] | None = None) -> float:

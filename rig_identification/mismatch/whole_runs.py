@@ -22,6 +22,7 @@ from rig_identification.mismatch.screen import carried, extended
 from rig_identification.mismatch.trial import (
     Trial,
     beyond_doubt,
+    is_ordinary,
     may_be_none,
     ordinary_errors,
     possible,
@@ -83,8 +84,10 @@ def fitted_whole(
         found = sorted(found, key=lambda t: -strength(as_fitted(fitted, t), bounds))
     heard = trace_of(ideal.fitted, fitted) if verdict.verdict != "none" else None
     trace, loose = heard is not None, 1.0 if heard is None else heard.looseness
-    findings = _findings(ideal, fitted, found, after.holdout, loose)
-    effects = effects_of(findings)
+    # What is ordinary is in the model, and no finding
+    named_here = [t for t in found if not is_ordinary(as_fitted(fitted, t))]
+    findings = _findings(ideal, fitted, named_here, after.holdout, loose)
+    effects = effects_of(findings) or ", ".join(t.candidate.label for t in found)
     errors = held_out_errors(ideal.scores.holdout, after.holdout)
     can_be = all(possible(as_fitted(fitted, t)) for t in found)
     if not can_be:
@@ -95,13 +98,13 @@ def fitted_whole(
         )
     elif verdict.verdict == "none":
         told, text = "explained", f"With {effects} in the model every residual is noise. {errors}"
-    elif trace:
+    elif trace and findings:
         told, text = "explained", f"{effects} explains all but a trace. {errors} {verdict.explanation}"
     else:
-        told = "unexplained"
+        told, trace = "unexplained", False
         # An amount that may as well be none bends to what is left, and tells nothing of it
         findings = tuple(
-            f for f, t in zip(findings, found, strict=True) if not may_be_none(as_fitted(fitted, t))
+            f for f, t in zip(findings, named_here, strict=True) if not may_be_none(as_fitted(fitted, t))
         )
         effects = effects_of(findings) or "Nothing"
         text = f"{effects} explains part of it; something is left. {verdict.explanation}"
@@ -112,6 +115,14 @@ def fitted_whole(
     if outcome.told:
         named.heard(outcome)
     return outcome
+
+
+def ordinary_alone(found: Explained) -> Explained:
+    """What explains the session, as no finding where all of it is ordinary; as it is otherwise."""
+    if not found.wholly or found.mismatch.findings:
+        return found
+    text = f"{found.mismatch.explanation} That is within what every such rig has, and no finding."
+    return replace(found, mismatch=replace(found.mismatch, verdict="none", explanation=text))
 
 
 def strayed(fitted: Fitted) -> bool:

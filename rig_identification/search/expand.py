@@ -27,6 +27,7 @@ from rig_identification.mismatch.trial import (
     Trial,
     attempt,
     beyond_doubt,
+    is_ordinary,
     mass_of,
     ordinary_errors,
     possible,
@@ -62,6 +63,7 @@ class Standing:
     rung: Rung
     found: tuple[Candidate, ...] = ()
     unearned: float = 0.0  # nats that it gains from the noise of the exciter's force alone (in_motion.py)
+    promises: tuple[Promise, ...] | None = None  # about it, where they are known
 
     @property
     def evidence(self) -> float:
@@ -94,13 +96,13 @@ def children(
     """
     rung = standing.rung
     left = compatible(candidates, list(standing.found))
+    if promises is None and standing.promises is not None:
+        promises = list(standing.promises)
     if promises is None:
-        say("screening")
-        promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
-        promises += promised_laws(rung, standing.found)
+        promises = _screened(rung, standing.found, left, say)
     promised_here = worthy(promises, count_of(candidates))
     taut = [] if rung.alone else _stretching(standing, budget, say)
-    led = _led_by(problem, standing, taut, promised_here, budget, say)
+    led = _led_by(problem, standing, taut, promised_here, candidates, budget, say)
     if led:
         return led
     first = _first_fits(standing, promised_here, budget, say) + taut
@@ -131,27 +133,41 @@ def children(
     return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
 
 
+def _screened(rung: Rung, found: tuple[Candidate, ...], left: list[Candidate], say: Say) -> list[Promise]:
+    """What the hypotheses ``left`` promise about a model with the effects ``found``."""
+    say("screening")
+    promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
+    return promises + promised_laws(rung, found)
+
+
 def _led_by(
     problem: Problem,
     standing: Standing,
     taut: list[Standing],
     promises: list[Promise],
+    candidates: list[Candidate],
     budget: Budget,
     say: Say,
 ) -> list[Standing]:
     """Cables that stretch at their level, where they gain what anything else promises and leave something.
 
     All cables stretch, and what else is there is there beside that. It is asked beside them: without them in
-    the model it bends to what they do to the tensions, and its fits cost several times theirs. Where they
-    leave nothing, or make no sense, they are one hypothesis of others. taut: their first fit.
+    the model it bends to what they do to the tensions, and its fits cost several times theirs. Beside them it
+    promises more then than without them; where it promises less they stand in for it. Where they leave
+    nothing, or make no sense, they are one hypothesis of others. taut: their first fit.
     """
-    if not taut or _gain(standing, taut[0]) < max((p.gain for p in promises), default=np.inf):
+    most = max((p.gain for p in promises), default=np.inf)
+    if not taut or _gain(standing, taut[0]) < most:
         return []
     begun = taut[0].rung
     down = walked_down(begun.model, begun.evaluation.point, begun.level)
     if down is None or down.alone:
         return []
     led = replace(taut[0], rung=down)
+    beside = _screened(down, led.found, compatible(candidates, list(led.found)), say)
+    if max((p.gain for p in worthy(beside, count_of(candidates))), default=0.0) < most:
+        return []
+    led = replace(led, promises=tuple(beside))
     every = [s for s in (led, *_closer(problem, led, budget, say)) if makes_sense(s, problem)]
     return sorted(every, key=lambda s: -s.evidence)
 
@@ -327,12 +343,15 @@ def special_cases(candidate: Candidate, others: list[Candidate]) -> list[Candida
 
 
 def makes_sense(standing: Standing, problem: Problem) -> bool:
-    """Whether the last effect has an amount and a place that it can have, beyond what is ordinary.
+    """Whether the last effect has an amount and a place that it can have, beyond what the ideal model has.
 
-    problem: without any effect.
+    What is ordinary and not in the ideal model makes sense, and is no finding (whole_runs.py). problem:
+    without any effect.
     """
     trial = _last_of(standing)
-    return possible(trial) and beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
+    if not possible(trial):
+        return False
+    return is_ordinary(trial) or beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
 
 
 def _last_of(standing: Standing) -> Trial:

@@ -14,7 +14,7 @@ from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.mismatch.undecided import undecided
-from rig_identification.mismatch.whole_runs import Heard, unheard
+from rig_identification.mismatch.whole_runs import Heard, ordinary_alone, unheard
 from rig_identification.search.changed import Asked, changes_of, explained_changed
 from rig_identification.search.disagreeing import where_runs_disagree
 from rig_identification.search.events import events_beside, events_of, explained_outside, standing_out
@@ -68,7 +68,7 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     if worthy(promises, count):
         found = search(ideal, Rung(problem, evaluation, ALONE), notify, budget, promises=promises).told
         if found is not None and found.wholly:
-            return found
+            return ordinary_alone(found)
     return undecided(ideal, problem, evaluation, promises, count, notify, budget)
 
 
@@ -108,7 +108,7 @@ def _explain(
         return agreed
     outcome = search(ideal, first, notify, budget, heard)
     if outcome.told is not None or watched:
-        return outcome.told
+        return None if outcome.told is None else ordinary_alone(outcome.told)
     seen(outcome.rung)
     found = _beside(ideal, outcome, rest_explained, notify, budget)
     if found is None and asked.changes and not asked.leading:

@@ -255,6 +255,9 @@ def _searched(so_far: SoFar, notify: Progress) -> Identification:
         ideal = so_far.ideal = with_pieces(ideal, searching)
         plain = compose(session, ideal.fitted, ideal.scores, ideal.mismatch, ideal.careful)
         return plain if note is None else replace(plain, notes=(*plain.notes, note))
+    if found.mismatch.verdict == "none" and found.effects:
+        # What is ordinary, and in no ideal model
+        return compose(session, found.fitted, scores(found.fitted), found.mismatch, None, rivals=found.bodies)
     if found.mismatch.verdict == "none":
         return compose(
             session, ideal.fitted, ideal.scores, found.mismatch, ideal.careful, rivals=found.bodies

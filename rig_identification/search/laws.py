@@ -13,6 +13,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.carried_air import CARRIED_NAME, CarriedAir
 from rig_identification.mismatch.explained import Explained
+from rig_identification.mismatch.findings import effects_of
 from rig_identification.mismatch.place_scan import Shape, best_places
 from rig_identification.mismatch.plates import AREA_NAME, PLATES
 from rig_identification.mismatch.point_laws import LAWS, law_finding, parts_of, sparser
@@ -58,7 +59,13 @@ def in_words(best: Explained, found: list[Trial]) -> Explained:
         law_finding(best.fitted, law, f) if f.effect == law.effect and amount in f.parameters else f
         for f in best.mismatch.findings
     )
-    return replace(best, mismatch=replace(best.mismatch, findings=findings))
+    named = effects_of(findings)
+    text = best.mismatch.explanation.replace(effects_of(best.mismatch.findings), named, 1)
+    others = tuple(a for a in best.mismatch.alternatives if a["effect"] not in named.split(", "))
+    if named == effects_of(best.mismatch.findings):
+        others = best.mismatch.alternatives
+    told = replace(best.mismatch, explanation=text, findings=findings, alternatives=others)
+    return replace(best, mismatch=told)
 
 
 def _law_of(found: list[Trial]) -> Trial | None:

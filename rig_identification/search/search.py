@@ -22,7 +22,7 @@ from rig_identification.search.crossed import crossed, siblings
 from rig_identification.search.expand import MEANT, Standing, children, described_closer
 from rig_identification.search.ladder import REACHED, Rung, begun, climbed
 from rig_identification.search.levels import ALONE
-from rig_identification.search.stretch import over_all, stretch_of
+from rig_identification.search.stretch import grown, over_all, stretch_of
 from rig_identification.search.whole import MOST_EFFECTS, in_whole_runs
 
 Notify = Callable[[str, float], None]
@@ -127,6 +127,13 @@ def search(
                 told = found
             if likeliest is best:
                 partly = found
+            longer = None if budget.spent() else grown(whole, best.found, best.rung)
+            if longer is not None:
+                # Its stretch has nothing left to ask: what whole runs lack shows later
+                likeliest, looked_at = Standing(longer, best.found), problem
+                queue = [likeliest] if len(best.found) < MOST_EFFECTS else []
+                idle[id(likeliest)] = 0
+                continue
         for child in every:
             if child.evidence - standing.evidence < REACHED * (best.evidence - standing.evidence):
                 # What stands in for two effects leads by less over either of them
