@@ -117,6 +117,7 @@ setup(
         "completion": ["shtab>=1.6"],
         "browser": ["playwright>=1.40"],
         "docs": ["mkdocs-material>=9.5", "mkdocstrings[python]>=0.27"],
+        "notebook": ["ipykernel>=6.20", "matplotlib>=3.6", "nbclient>=0.8", "nbformat>=5.7", "pandas>=2.0"],
         "dev": ["exudyn>=1.8", "mujoco>=3.1", "mypy>=1.10"],
     },
     entry_points={"console_scripts": ["rig-identification = rig_identification.cli.main:main", *NODES]},

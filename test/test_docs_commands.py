@@ -7,6 +7,7 @@ what is not here.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -16,13 +17,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from test_docs_pages import DOCS, README, ROOT, blocks
 from test_several_commands import sessions, write
 
 import rig_identification as ri
-from rig_identification.cli.main import build_parser
+from rig_identification.cli.main import build_parser, main
 
 COMMAND = "rig-identification"
 PAGES = [README, *sorted(DOCS.rglob("*.md"))]
@@ -43,6 +45,8 @@ ELSEWHERE = {
     "docs/how-to/import.md": "test_newcomer.py",
     "docs/how-to/own-effect.md": "test_own_effect.py",
     "docs/thesis.md": "test_thesis_rerun.py",
+    "docs/tutorials/live-rig.md": "test_nodes_tutorial.py",
+    **{name_of(page): "test_docs_effects.py" for page in sorted((DOCS / "effects").glob("*.md"))},
     **{name_of(page): "test_docs_recordings.py" for page in sorted((DOCS / "recordings").glob("*.md"))},
 }
 
@@ -126,6 +130,45 @@ def remembered(folder: Path) -> None:
     run("rig-identification identify monday --out results/monday", folder)
 
 
+def drone(folder: Path) -> None:
+    """The page's own description of a drone on two strings."""
+    (folder / "rig.yaml").write_text(blocks(DOCS / "tutorials" / "drone.md", "yaml")[0], encoding="utf-8")
+
+
+def mismatch_of(answer: Path) -> dict[str, Any]:
+    """What an answer says is left out."""
+    told: dict[str, Any] = json.loads((answer / "result.json").read_text(encoding="utf-8"))["mismatch"]
+    return told
+
+
+def car_says(folder: Path) -> None:
+    """No fault, nothing left out."""
+    assert json.loads((folder / "car" / "check" / "check.json").read_text(encoding="utf-8"))["faults"] == []
+    assert mismatch_of(folder / "car" / "answer")["verdict"] == "none"
+
+
+def drone_says(folder: Path) -> None:
+    """Jzz and Jxx as simulated, to some percent; Jyy hardly."""
+    told = json.loads((folder / "answer" / "result.json").read_text(encoding="utf-8"))
+    assert told["mismatch"]["verdict"] == "none"
+    J, std = told["inertia"]["value"], told["inertia"]["std"]
+    for i, true in ((0, 0.012), (2, 0.022)):
+        assert abs(J[i][i] - true) < 4.0 * std[i][i] < 0.1 * true
+    assert J[1][1] is None or std[1][1] > 0.1 * J[1][1]
+
+
+def mystery_says(folder: Path) -> None:
+    """The hidden effect is found; repaired, nothing is left, and both are one body."""
+    told = mismatch_of(folder / "mystery_answer")
+    assert told["verdict"] == "explained"
+    (finding,) = told["findings"]
+    assert finding["effect"] == "hinge_damping"
+    damping = finding["parameters"]["damping"]
+    assert abs(damping["value"] - 20.0) < 4.0 * damping["std"]
+    assert mismatch_of(folder / "repaired_answer")["verdict"] == "none"
+    assert json.loads((folder / "agreement" / "compare.json").read_text(encoding="utf-8"))["agree"] is True
+
+
 @dataclass(frozen=True)
 class Case:
     """Blocks of a page that are run one after the other in one folder."""
@@ -135,6 +178,7 @@ class Case:
     given: Callable[[Path], None]
     makes: tuple[str, ...]  # files that are there in the end
     long: bool = True
+    says: Callable[[Path], None] | None = None  # holds what the page says of the results
 
 
 CASES = (
@@ -159,6 +203,31 @@ CASES = (
     Case("docs/how-to/own-rig.md", (0, 1), own_rig, ("trial_answer/report.html", "ANSWER/report.html")),
     Case("docs/how-to/batch.md", (0,), simulated("sessions/a", "sessions/b"), ("results/a/result.json",)),
     Case("docs/how-to/plan.md", (0,), described, ("plan/plan.html", "plan/session.yaml")),
+    Case(
+        "docs/tutorials/car.md",
+        (0, 1, 2, 3),
+        nothing,
+        (
+            "car/report.html",
+            "car/check/check.html",
+            "car/answer/report.html",
+            "car/certificate/certificate.html",
+        ),
+        says=car_says,
+    ),
+    Case("docs/tutorials/drone.md", (0, 1, 2), drone, ("answer/report.html",), says=drone_says),
+    Case(
+        "docs/tutorials/first-mismatch.md",
+        (0, 1, 2, 3, 4),
+        nothing,
+        (
+            "mystery_answer/report.html",
+            "wide/session.yaml",
+            "repaired_answer/report.html",
+            "agreement/compare.html",
+        ),
+        says=mystery_says,
+    ),
     Case("docs/how-to/plan.md", (1,), lambda folder: after_a_session(folder), ("plan/plan.html",)),
 )
 
@@ -197,6 +266,34 @@ def test_the_commands_of_a_page_do_what_it_says(case: Case, tmp_path: Path) -> N
         for line in told[i]:
             run(line, tmp_path)
     assert [name for name in case.makes if not (tmp_path / name).is_file()] == []
+    if case.says is not None:
+        case.says(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("hinges", "alike"),
+    [("hinge_damping=20", True), pytest.param("hinge_friction=0.15", False, marks=pytest.mark.long)],
+)
+def test_both_amplitudes_of_the_first_mismatch_lose_the_same_share(
+    hinges: str, alike: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The experiment of the page, and its Python, as they stand; dry hinges take more of the small swing."""
+    pytest.importorskip("pandas", reason="pip install '.[pandas]'")
+    page = DOCS / "tutorials" / "first-mismatch.md"
+    monkeypatch.chdir(tmp_path)
+    hidden = ri.simulate(case=14, start="pulled", shake=(0.05, 0.7), duration=1.0, rest=0.0)
+    hidden.write("mystery")
+    for line in shell_blocks(page)[2]:
+        assert main(shlex.split(line.replace("hinge_damping=20", hinges))[1:]) == 0
+    (code,) = blocks(page, "python")
+    names: dict[str, Any] = {}
+    if alike:
+        exec(compile(code, str(page), "exec"), names)
+        assert 0.1 < names["small"] < 0.9  # it does die down
+    else:
+        with pytest.raises(AssertionError):
+            exec(compile(code, str(page), "exec"), names)
+        assert names["small"] < 0.8 * names["wide"]
 
 
 def test_every_block_is_run_or_cannot_be() -> None:

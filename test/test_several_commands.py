@@ -67,6 +67,17 @@ def test_joint_information_survives_the_file() -> None:
     np.testing.assert_array_equal(again.mounts["imu"], joint.mounts["imu"])
 
 
+def test_a_tolerance_that_numpy_worked_out_survives_the_file() -> None:
+    """As that of a finding whose range scales with a root: it was written by numpy's name for it."""
+    joint = sessions()[0].joint
+    assert joint is not None
+    first, *others = joint.doubts
+    joint = replace(joint, doubts=(replace(first, prior_std=np.sqrt(first.prior_std) ** 2), *others))
+    written = json.dumps(joint_to_dict(joint))
+    assert "np." not in written
+    assert joint_from_dict(json.loads(written)).doubts == joint.doubts
+
+
 def test_a_result_read_again_fuses_as_the_one_that_was_written(tmp_path: Path) -> None:
     told = sessions()
     read = [read_result(write(r, tmp_path / r.name) / "result.json", r.name) for r in told]

@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig_identification.api.truth import truth_document
 from rig_identification.cli.effects import effect_of, effects_document, effects_given
 from rig_identification.errors import InputError
+from rig_identification.live.plant_effects import with_effects
+from rig_identification.live.plant_switches import effects_of
 from rig_identification.model.body import tensor
-from rig_identification.recording import Dummy, Recording, Session
+from rig_identification.model.motion import rig_model
+from rig_identification.recording import Dummy, Recording, Series, Session
 from rig_identification.rig import Mount
 from rig_identification.session import read_rig, read_session, write_session
 from rig_identification.simulate import (
@@ -27,6 +31,7 @@ from rig_identification.simulate import (
     case_spec,
     simulate_session,
 )
+from rig_identification.simulate.start import rest_state
 from rig_identification.thesis import load_case
 
 RATES = SampleRates(tension=200.0, exciter=200.0, shaft=50.0, imu=100.0, inclinometer=50.0, mocap=60.0)
@@ -357,6 +362,79 @@ def test_a_reading_may_follow_a_law_of_its_own() -> None:
     assert moved == pytest.approx(6.0 * (1.0 - np.exp(-0.5 * first.time)), abs=0.05)
 
 
+def test_a_lagging_device_is_late_and_a_little_weaker() -> None:
+    """Of a swing at angular frequency w it shows 1/(1 + i w tau)."""
+    run, tau, hertz = RunSpec("run_1", 8.0, AtRest(), MOTOR), 0.02, 0.7
+    plain, slow = (recorded(car(run, effects=e)) for e in ({}, {"imu.lag": (tau,), "exciter.lag": (tau,)}))
+
+    def phasor(series: Series, column: int) -> complex:
+        # Five periods once the motor has its speed, from which a straight line is taken off
+        time = series.time[series.time > 8.0 - 5.0 / hertz]
+        values = series.values[-time.size :, column]
+        values = values - np.polyval(np.polyfit(time, values, 1), time)
+        return complex(np.sum(values * np.exp(-2j * np.pi * hertz * time)))
+
+    shown = 1.0 / (1.0 + 2j * np.pi * hertz * tau)
+    force = phasor(slow.exciter_force, 0) / phasor(plain.exciter_force, 0)
+    assert force == pytest.approx(shown, abs=0.01)
+    assert slow.tension["cable_1"].values == pytest.approx(plain.tension["cable_1"].values)
+    later = np.interp(plain.imu.time + tau, slow.imu.time, slow.imu.values[:, 1])[200:-50]
+    off = later - plain.imu.values[200:-50, 1]
+    assert np.std(off) < 0.02 * np.std(plain.imu.values[:, 1])
+    assert np.std(slow.imu.values[:, 1] - plain.imu.values[:, 1]) > 0.06 * np.std(plain.imu.values[:, 1])
+
+
+def test_a_soft_mount_enlarges_by_the_square_of_frequency() -> None:
+    """Far below resonance u - k d2u/dt2 (estimate/mounting.py): the gyroscope alone has a mount here."""
+    run, softness = RunSpec("run_1", 4.0, PULL), 4e-4
+    effects = {"imu.mount.angular_rate.softness": (softness,), "imu.mount.angular_rate.damping": (0.3,)}
+    plain, soft = (recorded(car(run, effects=e)).imu for e in ({}, effects))
+    second = np.gradient(np.gradient(plain.values[:, 0], plain.time), plain.time)
+    more = soft.values[:, 0] - plain.values[:, 0]
+    late = slice(150, -10)
+    assert np.corrcoef(more[late], -softness * second[late])[0, 1] > 0.98
+    assert soft.values[:, 3:] == pytest.approx(plain.values[:, 3:])
+
+
+def test_an_inclinometers_zero_and_an_exciters_place_are_off_as_told() -> None:
+    run = RunSpec("run_1", 2.0, AtRest(), MOTOR)
+    plain, wrong = (recorded(car(run, effects=e)) for e in ({}, {"inclinometer.zero.y": (0.004,)}))
+    assert wrong.inclination.values - plain.inclination.values == pytest.approx(
+        np.broadcast_to([0.0, 0.004], plain.inclination.values.shape), abs=1e-5
+    )
+    moved = recorded(car(run, effects={"exciter.position.z": (0.3,)}))
+    assert moved.exciter_force.values == pytest.approx(plain.exciter_force.values, abs=1e-6 * WEIGHT)
+    assert np.std(moved.imu.values[:, 0] - plain.imu.values[:, 0]) > 1e-4
+
+
+def test_plumb_cables_do_not_feel_an_edge_and_inclined_ones_are_shorter() -> None:
+    """The longer way around the edge lifts the body; a cable that hangs plumb touches it in one point."""
+    plumb, inclined = (read_rig(CONFIG / name) for name in ("trifilar.yaml", "car_four_cables.yaml"))
+    for rig, lifted in ((plumb, False), (inclined, True)):
+        hinges = np.array([cable.body_point for cable in rig.cables])
+        middle = np.array([*np.mean(hinges, axis=0)[:2], np.min(hinges[:, 2]) - 0.2])
+        model = rig_model(rig, np.array([500.0, *middle, 90.0, 0.0, 0.0, 90.0, 0.0, 90.0]))
+        edged = with_effects(model, effects_of({"cable_edge": (0.05,)}, model))
+        rise = rest_state(edged).position[2] - rest_state(model).position[2]
+        assert bool(rise > 1e-5) == lifted
+
+
+def test_a_body_without_its_gyroscopic_moment_turns_otherwise() -> None:
+    run = RunSpec("run_1", 3.0, PULL)
+    plain, without = (recorded(car(run, effects=e)) for e in ({}, {"gyroscopic_share": (1.0,)}))
+    off = np.abs(plain.imu.values[:, :3] - without.imu.values[:, :3])
+    assert 0.0 < np.max(off) < 0.1 * np.max(np.abs(plain.imu.values[:, :3]))
+
+
+def test_a_law_is_told_beside_the_truth() -> None:
+    """No description has it: it was a KeyError."""
+    run, given = RunSpec("run_1", 1.0, PULL), {"cable_1.drift": (3.0,), "imu.lag": (0.01,)}
+    _, truth = simulate_session(car(run, effects=given), np.random.default_rng(0))
+    told = truth_document(truth)
+    assert told["parameters"]["cable_1.drift"] == {"value": 3.0, "described": 0.0}
+    assert {e["effect"] for e in told["effects"]} == {"unknown", "sensor_lag"}
+
+
 def test_a_law_of_what_is_not_measured_is_refused() -> None:
     with pytest.raises(InputError, match=r"effect cable_9.drift: is unknown"):
         recorded(car(RunSpec("run_1", 2.0), effects={"cable_9.drift": (1.0,)}))
@@ -386,6 +464,14 @@ def test_effects_of_the_command_line_are_told_in_the_contracts_words() -> None:
     assert told["tether"] == {"tether": [100.0, 0.0, 0.0], "tether_point": [0.0, 0.0, 1.0]}
     assert effect_of("sprung_mass.position") == "sprung_mass"
     assert effect_of("imu.position.y") == "imu_position"
+    assert effect_of("exciter.position.y") == "exciter_position"
+    assert effect_of("exciter.orientation.y") == "exciter_misalignment"
+    assert effect_of("cable_1.lag") == "sensor_lag"
+    assert effect_of("imu.mount.specific_force.softness") == "sensor_resonance"
+    assert (
+        effect_of("inclinometer.zero.x") == effect_of("inclinometer.orientation.x") == "inclinometer_offset"
+    )
+    assert effect_of("gyroscopic_share") == "gyroscopic_term"
     assert effect_of("imu.gyroscope.x.feels.accelerometer.z") == effect_of("cable_1.drift") == "unknown"
     with pytest.raises(InputError, match="--effect hinge_damping: give NAME=VALUE"):
         effects_given(["hinge_damping"])

@@ -15,11 +15,18 @@ _OF_DEVICE = {
     "load_cell_gain": "load_cell_gain",
     "load_cell_zero": "load_cell_offset",
     "clock": "clock_offset",
+    "lag": "sensor_lag",
+    "mount": "sensor_resonance",
+    "zero": "inclinometer_offset",
 }
+#: Kind of an error of where the exciter is -> the contract's effect.
+_OF_EXCITER = {"position": "exciter_position", "orientation": "exciter_misalignment"}
 #: Switches that belong to an effect of another name; ropes that twist have none in the contract's table.
-_OF_SWITCH = {"cable_damping_ratio": "cable_elasticity", "cable_torsion": "unknown"} | dict.fromkeys(
-    ("tether_damping", "tether_point", "tether_pull", "tether_reach"), "tether"
-)
+_OF_SWITCH = {
+    "cable_damping_ratio": "cable_elasticity",
+    "cable_torsion": "unknown",
+    "gyroscopic_share": "gyroscopic_term",
+} | dict.fromkeys(("tether_damping", "tether_point", "tether_pull", "tether_reach"), "tether")
 
 
 def effect_of(name: str) -> str:
@@ -29,6 +36,8 @@ def effect_of(name: str) -> str:
     if {"feels", "drift", "load_cell_curve", "load_cell_hysteresis", "load_cell_play"} & set(rest.split(".")):
         # A law of a reading, which the contract's table has no word for
         return "unknown"
+    if first == "exciter" and kind in _OF_EXCITER:
+        return _OF_EXCITER[kind]
     if kind == "orientation":
         return "imu_misalignment" if first == "imu" else "inclinometer_offset"
     return _OF_SWITCH.get(first, _OF_DEVICE.get(kind, first) if first not in _WITH_PARTS else first)

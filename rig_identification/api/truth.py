@@ -44,7 +44,8 @@ def truth_document(truth: Truth) -> dict[str, Any]:
         "inertia": tensor(truth.elements[4:]).tolist(),
         "effects": effects_document(truth.effects),
         "parameters": {
-            name: {"value": value, "described": truth.described[name]}
+            # Of a lag or a law that an effect switches on, no description says anything: it has none
+            name: {"value": value, "described": truth.described.get(name, 0.0)}
             for name, value in truth.parameters.items()
         },
         "least_tension": truth.least_tension,

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rig_identification.live.push import Push
 from rig_identification.model import layout
+from rig_identification.model.edges import edge_shifts
 from rig_identification.model.effects import place
 from rig_identification.model.equilibrium import design_pose, find_rest, settle
 from rig_identification.model.motion import RigModel, State
@@ -116,6 +117,8 @@ class PlantEffects:
     ceiling_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, world: hinges' errors
     body_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, body: hinges' errors
     level_error: Array = field(default_factory=lambda: np.zeros(2))  # rad, ceiling tilted about world x and y
+    cable_edge: float = 0.0  # m, radius of what every cable bends over at the ceiling
+    gyroscopic_share: float = 0.0  # of the gyroscopic moment that is left out; in nature none
     riders: tuple[Rider, ...] = ()
     ceiling: YieldingCeiling | None = None
     own: tuple[tuple[float, ...], ...] = ()  # numbers of each of the lab's own effects (own.py)
@@ -159,6 +162,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.ROTOR_MASS] = effects.exciter_rotor
     physics[block + place.LINEAR_DENSITY] += effects.cable_mass
     physics[block + place.TORSION] = effects.cable_torsion
+    physics[block + place.GYROSCOPIC_SHARE] = effects.gyroscopic_share
     rest = _rest(elastic.with_physics(physics))
     physics = elastic.with_physics(physics).referred(rest).physics
     physics[block + place.TWISTED : block + place.TWISTED + 3] = effects.cable_twist
@@ -215,6 +219,8 @@ def _with_rig_errors(model: RigModel, effects: PlantEffects) -> Array:
         physics[o + layout.LENGTH] += error
         physics[o + layout.CEILING_POINT : o + layout.CEILING_POINT + 3] += ceiling[i]
         physics[o + layout.BODY_POINT : o + layout.BODY_POINT + 3] += body[i]
+    for entry, change in edge_shifts(model) if effects.cable_edge > 0.0 else ():
+        physics[entry] += effects.cable_edge * change
     # A ceiling tilted against gravity is gravity tilted against the ceiling
     tilt = Rotation.from_rotvec([effects.level_error[0], effects.level_error[1], 0.0])
     gravity = physics[layout.GRAVITY : layout.GRAVITY + 3]

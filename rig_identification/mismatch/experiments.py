@@ -62,6 +62,11 @@ _EXPERIMENTS = {
 }
 
 
+def kinds() -> tuple[str, ...]:
+    """Every kind of effect (Candidate.kind) with an experiment, the lab's own ones aside."""
+    return tuple(_EXPERIMENTS)
+
+
 def experiment_for(kind: str) -> str:
     """What to do to tell a kind of effect (Candidate.kind) from its rivals; empty where nothing is known."""
     own = {effect.name: effect.experiment for effect in own_effects()}

@@ -28,7 +28,7 @@ def joint_to_dict(joint: JointInformation) -> dict[str, object]:
     return {
         "form": FORM,
         "elements": plain(joint.elements),
-        "doubts": [f"{d.name} {d.unit} {d.nominal!r} {d.prior_std!r} {d.at!r}" for d in joint.doubts],
+        "doubts": [_line(d) for d in joint.doubts],
         "root": _packed(joint.root),
         "weak": _packed(joint.weak),
         "weak_gradient": plain(joint.weak_gradient),
@@ -66,6 +66,12 @@ def joint_from_dict(document: Mapping[str, Any]) -> JointInformation:
         mounts={str(k): _numbers(v, (7,)) for k, v in document["mounts"].items()},
         start_ns=int(document["start_ns"]),
     )
+
+
+def _line(doubt: Doubt) -> str:
+    # numpy's own numbers call themselves np.float64(...)
+    nominal, prior_std, at = map(float, (doubt.nominal, doubt.prior_std, doubt.at))
+    return f"{doubt.name} {doubt.unit} {nominal!r} {prior_std!r} {at!r}"
 
 
 def _doubt(line: str) -> Doubt:

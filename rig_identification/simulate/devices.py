@@ -67,7 +67,9 @@ def watch_run(
     motion = flight.motion
 
     def sampled(device: str, mounts: Mounts, instant: Array) -> Array:
-        nodes = mounts.read(device, motion.outputs, motion.R_world_body, true.device)
+        nodes = true.shown(
+            device, flight.grid.step, mounts.read(device, motion.outputs, motion.R_world_body, true.device)
+        )
         return at_instants(flight.grid, instant, nodes) + true.drifted(device, instant - watch.begin)
 
     return _watch(spec, true, motion.R_world_body[0], sampled, watch, rng)
@@ -111,7 +113,8 @@ def watch_exciter(
     """The exciter's force cells; the force is linear between nodes."""
     instant = watch.instants(spec.rates.exciter, rng)
     nodes = flight.grid.step * np.arange(flight.grid.nodes)
-    values = np.stack([np.interp(instant, nodes, column) for column in flight.drive.force.T], axis=1)
+    force = true.shown("exciter", flight.grid.step, flight.drive.force)
+    values = np.stack([np.interp(instant, nodes, column) for column in force.T], axis=1)
     values = values + noise_std(spec, "exciter") * rng.standard_normal(values.shape)
     return Samples(instant + true.late("exciter"), values)
 

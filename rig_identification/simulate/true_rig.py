@@ -10,7 +10,16 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import truncnorm
 
 from rig_identification.errors import InputError, did_you_mean
-from rig_identification.estimate.parameters import INERTIAL, ParameterSet, parameter_set
+from rig_identification.estimate.lag import lagged
+from rig_identification.estimate.mounting import Answer, mounted
+from rig_identification.estimate.parameters import (
+    INERTIAL,
+    MOUNT_SIZE,
+    MOUNTED,
+    DeviceLayout,
+    ParameterSet,
+    parameter_set,
+)
 from rig_identification.live.plant_effects import PlantEffects, with_effects
 from rig_identification.live.plant_switches import effects_of, switches
 from rig_identification.model import layout, sensors
@@ -20,6 +29,8 @@ from rig_identification.simulate.spec import SessionSpec
 
 Array = NDArray[np.float64]
 
+#: What an exciter's own switches begin with, beside its gain.
+MOUNT_OF_EXCITER = ("exciter.position.", "exciter.orientation.")
 #: Doubts are cut at so many tolerances: what lies beyond would be a finding.
 CUT = 3.0
 
@@ -45,6 +56,16 @@ class TrueRig:
             return np.zeros((time.size, 1))
         moved, _ = sensors.drift(time, self.device[self.parameters.places.drift(device)])
         return moved
+
+    def shown(self, device: str, step: float, values: Array) -> Array:
+        """(N, w) what a device shows of its readings ``values`` (N, w), ``step`` s apart."""
+        places, out = self.parameters.places, values
+        if device == "imu":
+            # Columns of the gyroscope, then of the accelerometer (sensors.imu)
+            parts = zip(("angular_rate", "specific_force"), (values[:, :3], values[:, 3:]), strict=True)
+            mounts = [(self.device[places.mount(q) :][:MOUNT_SIZE], part) for q, part in parts]
+            out = np.hstack([mounted(step, Answer(*own.tolist()), part) for own, part in mounts])
+        return lagged(step, float(self.device[places.lag(device)]), out)
 
     @property
     def R_body_exciter(self) -> Array:
@@ -104,20 +125,34 @@ def _with_physics(true: TrueRig, spec: SessionSpec) -> TrueRig:
 
 
 def _with_device_errors(true: TrueRig, spec: SessionSpec) -> TrueRig:
-    """The rig with its devices' errors."""
-    device, values = true.device.copy(), dict(true.values)
+    """The rig with errors of its devices, and of the exciter's place and orientation."""
+    device, physics, values = true.device.copy(), true.model.physics.copy(), dict(true.values)
     errors = {p.name: p.index for p in true.parameters.free if p.kind == "device"}
     measured, switched = channels_of(spec), _switched()
-    errors |= {n: e for n, e in true.parameters.places.laws().items() if n.split(".")[0] in measured}
+    errors |= {n: e for n, e in _beside_doubts(true.parameters.places).items() if n.split(".")[0] in measured}
+    placed = {p.name: p.index for p in true.parameters.free if p.name.startswith(MOUNT_OF_EXCITER)}
+    if spec.rig.exciter is not None:
+        errors["exciter.lag"] = true.parameters.places.lag("exciter")
     for name, given in spec.effects.items():
         if name in switched:
             continue
-        if name not in errors:
-            known = ", ".join(sorted([*switched, *errors]))
-            near = did_you_mean(name, [*switched, *errors])
-            raise InputError(f"effect {name}: is unknown; known are {known}{near}")
+        if name not in errors and name not in placed:
+            every = sorted([*switched, *errors, *placed])
+            near = did_you_mean(name, every)
+            raise InputError(f"effect {name}: is unknown; known are {', '.join(every)}{near}")
         if len(given) != 1 or not np.isfinite(given[0]):
             raise InputError(f"effect {name}: give one finite number")
-        device[errors[name]] += given[0]
+        (numbers, entry) = (device, errors[name]) if name in errors else (physics, placed[name])
+        numbers[entry] += given[0]
         values[name] = values.get(name, 0.0) + given[0]
-    return replace(true, device=device, values=values)
+    return replace(true, model=true.model.with_physics(physics), device=device, values=values)
+
+
+def _beside_doubts(places: DeviceLayout) -> dict[str, int]:
+    """Entries, by name, of what the ideal model has no doubt about: laws, lags, soft mounts, zeros."""
+    out = places.laws()
+    out |= {f"{d}.lag": places.lag(d) for d in (*places.cables, "imu", "inclinometer", "mocap")}
+    for quantity in MOUNTED:
+        for i, number in enumerate(("softness", "damping", "delay")):
+            out[f"imu.mount.{quantity}.{number}"] = places.mount(quantity) + i
+    return out | {f"inclinometer.zero.{a}": places.inclinometer + 3 + i for i, a in enumerate("xy")}
