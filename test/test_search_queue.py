@@ -103,6 +103,7 @@ def searched(
         return not (names in asked or asked.add(names))
 
     monkeypatch.setattr(queue, "grown", grown)
+    monkeypatch.setattr(queue, "makes_sense", lambda standing, problem: standing.rung.evidence > 0.0)
     monkeypatch.setattr(queue, "problem_of", lambda ideal: None)
     monkeypatch.setattr(queue, "catalogue", lambda problem: [_candidate("a")])
     first = _Rung(0.0, 0)
@@ -131,6 +132,9 @@ def test_what_explains_a_stretch_and_not_whole_runs_is_expanded_over_these(
     assert expanded == ["", "a"]
     assert whole == ["a", "a c"]
     assert found.likeliest.label == "a, c"
+    # Whole runs lead its numbers where they make no sense: all is asked anew over these
+    _, expanded, _ = searched(monkeypatch, tree, ("a c",), longer={"a": (-1.0, 5)})
+    assert expanded == ["", "", "a"]
 
 
 def test_another_first_effect_has_its_turn_where_the_likeliest_path_ends(

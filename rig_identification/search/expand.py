@@ -233,7 +233,7 @@ def earned(before: Standing, after: Standing) -> Standing:
 
 def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say: Say) -> list[Standing]:
     """First fits of promises, what is fitted soon before what is fitted in ten times the time."""
-    asked = list(_with_twins(sorted(promises, key=lambda p: p.candidate.slow)))
+    asked = list(_with_twins(sorted(promises, key=lambda p: p.candidate.slow), standing.found))
     first: list[Standing] = []
     kept = 0.0
     for k, promise in enumerate(asked):
@@ -360,12 +360,13 @@ def _last_of(standing: Standing) -> Trial:
     return Trial(standing.found[-1], rung.problem, rung.evaluation, standing.evidence, settled=True)
 
 
-def _with_twins(promises: list[Promise]) -> Iterator[Promise]:
-    """What is fitted: each promise, and what first order cannot tell from it."""
+def _with_twins(promises: list[Promise], found: tuple[Candidate, ...]) -> Iterator[Promise]:
+    """What is fitted: each promise, and its twins to first order that can stand beside ``found``."""
     for promise in promises:
         yield promise
         for candidate, values in promise.candidate.twins:
-            yield replace(promise, candidate=candidate, values=values, elsewhere=())
+            if compatible([candidate], list(found)):
+                yield replace(promise, candidate=candidate, values=values, elsewhere=())
 
 
 def worthy(promises: list[Promise], count: int) -> list[Promise]:
