@@ -58,13 +58,11 @@ def searched(
     traced: tuple[str, ...] = (),
     budget: Budget = UNLIMITED,
     beside: Tree | None = None,
-    longer: dict[str, tuple[float, int]] | None = None,
 ) -> tuple[queue.Outcome, list[str], list[str]]:
     """What a search comes to where models have these children; what it expands, and what it asks whole runs.
 
     tree: of each model its children (names, log evidence, level). explained: models that explain all;
     traced: those that leave a trace. beside: of each rival of a first effect itself with the second one.
-    longer: log evidence and level over whole runs of models that a stretch leaves nothing to ask of.
     """
     expanded: list[str] = []
     whole: list[str] = []
@@ -90,20 +88,7 @@ def searched(
     monkeypatch.setattr(queue, "crossed", crossed)
     monkeypatch.setattr(queue, "in_whole_runs", in_whole_runs)
     monkeypatch.setattr(queue, "stretch_of", lambda rung: rung)
-
-    def grown(whole: object, found: tuple[Candidate, ...], part: object) -> object:
-        over_whole = (longer or {}).get(" ".join(c.effect for c in found))
-        return None if over_whole is None or not whole_runs_left(found) else _Rung(*over_whole)
-
-    asked: set[str] = set()
-
-    def whole_runs_left(found: tuple[Candidate, ...]) -> bool:
-        """Once of each: then they are what is looked at."""
-        names = " ".join(c.effect for c in found)
-        return not (names in asked or asked.add(names))
-
-    monkeypatch.setattr(queue, "grown", grown)
-    monkeypatch.setattr(queue, "makes_sense", lambda standing, problem: standing.rung.evidence > 0.0)
+    monkeypatch.setattr(queue, "described_closer", lambda *_: [])
     monkeypatch.setattr(queue, "problem_of", lambda ideal: None)
     monkeypatch.setattr(queue, "catalogue", lambda problem: [_candidate("a")])
     first = _Rung(0.0, 0)
@@ -122,19 +107,6 @@ def test_the_likeliest_model_is_expanded_until_whole_runs_are_explained(
     assert found.told is found.partly
     assert found.told is not None
     assert found.likeliest.label == "a, c"
-
-
-def test_what_explains_a_stretch_and_not_whole_runs_is_expanded_over_these(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    tree = {"": [("a", 100.0, ALONE), ("b", 80.0, ALONE)], "a": [("a c", 900.0, ALONE)]}
-    found, expanded, whole = searched(monkeypatch, tree, ("a c",), longer={"a": (700.0, 5)})
-    assert expanded == ["", "a"]
-    assert whole == ["a", "a c"]
-    assert found.likeliest.label == "a, c"
-    # Whole runs lead its numbers where they make no sense: all is asked anew over these
-    _, expanded, _ = searched(monkeypatch, tree, ("a c",), longer={"a": (-1.0, 5)})
-    assert expanded == ["", "", "a"]
 
 
 def test_another_first_effect_has_its_turn_where_the_likeliest_path_ends(
@@ -300,6 +272,7 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(expand, "contradicted", lambda trial: trial.candidate.effect == "clock")
     monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, level))
     monkeypatch.setattr(expand, "_closer", lambda *_: [])
+    monkeypatch.setattr(expand, "leaves_noise", lambda rung: False)
     monkeypatch.setattr(expand, "_giving_way", lambda *_: [])
     monkeypatch.setattr(expand, "_stretching", lambda *_: [])
     monkeypatch.setattr(expand, "_clocks_and_lags", lambda ranked: ranked)

@@ -14,8 +14,7 @@ from rig_identification.estimate.identify import _begun, _silent, pose_problem
 from rig_identification.estimate.prediction import drive
 from rig_identification.estimate.solve import evaluate
 from rig_identification.search.ladder import Rung, begun
-from rig_identification.search.levels import ALONE
-from rig_identification.search.stretch import SECONDS, grown, over_all, stretch_of
+from rig_identification.search.stretch import SECONDS, over_all, stretch_of
 from rig_identification.simulate import simulate_session
 
 
@@ -59,18 +58,6 @@ def test_what_was_found_in_a_part_is_carried_over_to_whole_runs(whole: Rung) -> 
     )
     # The way down the ladder takes few steps a level: what a part was fitted to may be nearer to the end
     assert again.evidence > whole.evidence - 5.0
-
-
-def test_what_a_stretch_does_not_ask_for_whole_runs_may(whole: Rung) -> None:
-    part = stretch_of(whole)
-    assert grown(whole, (), part) is None
-    # As if its stretch needed no wrench
-    quiet = Rung(part.model, part.evaluation, ALONE)
-    longer = grown(whole, (), quiet)
-    assert longer is not None
-    assert longer.level == whole.level
-    assert longer.evidence > whole.evidence - 5.0
-    assert grown(whole, (), replace(longer, level=ALONE)) is None
 
 
 def test_wide_nodes_hold_the_same_motion_and_force() -> None:

@@ -125,7 +125,7 @@ def children(
         down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
         if down is not None:
             walked.append(replace(child, rung=down))
-            if not down.alone:
+            if not leaves_noise(down):
                 walked += _closer(problem, walked[-1], budget, say)
     if not any(w.rung.alone for w in walked):
         walked += _unbent(standing, left, promised_here, budget, say)
@@ -396,14 +396,19 @@ def _entered(
     return wide, beside(rung.problem, there, wide, rung.evaluation)
 
 
+def leaves_noise(rung: Rung) -> bool:
+    """Whether a model needs no wrench, and its residuals as a whole show nothing more."""
+    return rung.alone and not shows(rung.evaluation)
+
+
 def described_closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> list[Standing]:
-    """A model that needs no wrench, with likelier closer descriptions of its effects, the likeliest first.
+    """A model that leaves noise on its stretch, with likelier closer descriptions of its effects, best first.
 
     They are asked where whole runs show that something is left. Of a model that leaves noise a closer
     description gains next to nothing, and its fit costs as much as the first one's: 7 nats of 82,000 and half
     of the work for the third axis that a car's wheels turn about. problem: without any effect.
     """
-    if not standing.rung.alone:
+    if not leaves_noise(standing.rung):
         # Those were asked on the way to its level
         return []
     every = [s for s in _closer(problem, standing, budget, say) if makes_sense(s, problem)]
@@ -435,7 +440,7 @@ def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> I
             if down is not None:
                 nearer = Standing(down, (*others, closer))
                 yield nearer
-                if nearer.evidence > standing.evidence + MEANT and not down.alone:
+                if nearer.evidence > standing.evidence + MEANT and not leaves_noise(down):
                     yield from _closer(problem, nearer, budget, say)
 
 

@@ -19,10 +19,10 @@ from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.crossed import crossed, siblings
-from rig_identification.search.expand import MEANT, Standing, children, described_closer, makes_sense
+from rig_identification.search.expand import MEANT, Standing, children, described_closer
 from rig_identification.search.ladder import REACHED, Rung, begun, climbed
 from rig_identification.search.levels import ALONE
-from rig_identification.search.stretch import grown, over_all, stretch_of
+from rig_identification.search.stretch import over_all, stretch_of
 from rig_identification.search.whole import MOST_EFFECTS, in_whole_runs
 
 Notify = Callable[[str, float], None]
@@ -127,16 +127,6 @@ def search(
                 told = found
             if likeliest is best:
                 partly = found
-            longer = None if budget.spent() else grown(whole, best.found, best.rung)
-            if longer is not None:
-                # Its stretch has nothing left to ask: what whole runs lack shows later
-                likeliest, looked_at = Standing(longer, best.found), problem
-                if not makes_sense(likeliest, problem):
-                    # A stretch told so little of it that its numbers lead nowhere
-                    likeliest, partly = Standing(whole), None
-                queue = [likeliest] if len(likeliest.found) < MOST_EFFECTS else []
-                idle[id(likeliest)] = 0
-                continue
         for child in every:
             if child.evidence - standing.evidence < REACHED * (best.evidence - standing.evidence):
                 # What stands in for two effects leads by less over either of them

@@ -5,8 +5,7 @@ A third of each run tells the same hypotheses apart, at a third of the work. It 
 run begins is known best: what swings within the body, follows slowly or creeps is at rest in most, and a
 start in the middle of it would be one more unknown. Where the missing wrench begins late the part is longer.
 Whole runs then judge what was found (whole.py), and the body's interval comes from all of them
-(:func:`over_all`). Where the stretch is explained and they are not, the search goes on over all of them
-(:func:`grown`).
+(:func:`over_all`).
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 from rig_identification.estimate.evidence import MARGIN, WIDE_NODE_STEP, Run
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.screen import carried, extended
-from rig_identification.search.ladder import PASSING, STAYING, Rung, fitted_at, walked_down
+from rig_identification.search.ladder import PASSING, STAYING, Rung, fitted_at
 from rig_identification.search.path import beside
 
 #: Length of the stretch (s): four or more swings of the slowest rigid mode of such rigs (0.37 Hz and up), so
@@ -55,27 +54,10 @@ def over_all(whole: Rung, found: tuple[Candidate, ...], part: Rung) -> Rung:
     """
     if part.alone or _length(part) == _length(whole):
         return part
-    return _carried_over(whole, found, part, part.level) or part
-
-
-def grown(whole: Rung, found: tuple[Candidate, ...], part: Rung) -> Rung | None:
-    """A model that its stretch leaves nothing to ask of, over whole runs at the level that these ask for.
-
-    What a sweep reaches late shows there alone. None where the stretch is all there is, or asks for a wrench,
-    or where whole runs cannot be followed. whole, found, part: as in :func:`over_all`.
-    """
-    if not part.alone or _length(part) == _length(whole):
-        return None
-    there = _carried_over(whole, found, part, whole.level)
-    return None if there is None else walked_down(there.model, there.evaluation.point, there.level)
-
-
-def _carried_over(whole: Rung, found: tuple[Candidate, ...], part: Rung, level: int) -> Rung | None:
-    """A stretch's model fitted to whole runs at one level."""
     wide = extended(whole.model, found)
     point = replace(whole.evaluation.point, theta=carried(wide, part.problem, part.evaluation.point).theta)
     moved = beside(whole.problem, point, wide, whole.evaluation)
-    return fitted_at(wide, moved, level, STAYING)
+    return fitted_at(wide, moved, part.level, STAYING) or part
 
 
 def _length(rung: Rung) -> int:
