@@ -34,7 +34,7 @@ from bench.effect_pictures import Shown, drawn, shown
 from rig_identification.cli.commands.simulate import OPTIONS
 from rig_identification.cli.effects import effects_given
 from rig_identification.cli.main import build_parser
-from rig_identification.estimate.identify import pose_problem
+from rig_identification.estimate.identify import ORDINARY, pose_problem
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.experiments import experiment_for, kinds
 from rig_identification.mismatch.findings import pushed
@@ -57,8 +57,6 @@ NAMED, LEAST = 6, 0.2
 PLAIN = ("simulate", "--case", "14", "--out", "trial")
 #: Nats from which a gain is none of chance, whichever hypothesis has it.
 SURE = 15.0
-#: Tolerances within which a number of the description is ordinary.
-ORDINARY = 3.0
 #: Std of its mean from which a reading at rest is told of.
 STANDS_OUT = 4.0
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_docs_pages import blocks
 
 from bench.effect_pages import (
     PAGES,
@@ -166,7 +167,7 @@ def test_a_pages_session_is_answered_with_its_effect(
 ) -> None:
     """The two commands of a page as they stand; what is named first, or ties with it, is the effect."""
     monkeypatch.chdir(tmp_path)
-    (block,) = re.findall(r"^```sh\n(.*?)^```$", page_of(effect), re.DOTALL | re.MULTILINE)
+    (block,) = blocks(PAGES / f"{effect}.md", "sh")
     for line in re.sub(r"\\\n\s*", "", block).splitlines():
         assert main(shlex.split(line)[1:]) == 0, line
     told = json.loads((tmp_path / "trial_answer" / "result.json").read_text(encoding="utf-8"))["mismatch"]

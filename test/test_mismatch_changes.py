@@ -15,7 +15,8 @@ from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.marginal import marginal
 from rig_identification.estimate.parameters import Parameter, Stretch
 from rig_identification.estimate.solve import evaluate
-from rig_identification.mismatch.change import Change
+from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.change import Change, Group
 from rig_identification.mismatch.changes import likeliest_changes
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.trial import mass_of
@@ -157,6 +158,22 @@ def test_a_number_counts_in_its_stretches_alone(clean: tuple[Session, Truth]) ->
     np.testing.assert_allclose(
         found.runs[1].residual, evaluation.runs[1].residual - 2.5 * column[1], atol=1e-9
     )
+
+
+@pytest.mark.parametrize(
+    ("steps", "can_be"), [((2e-3,), True), ((-1e-3,), False), ((2e-3, -1e-3), True), ((1e-3, -2e-3), False)]
+)
+def test_what_cannot_be_negative_is_not_after_a_change(steps: tuple[float, ...], can_be: bool) -> None:
+    """A cell may follow sooner than before, and never before it is pulled."""
+    lag = Parameter("cable_1.lag", "s", 0.0, 0.02, "device", 3, bounded=False)
+    late = Candidate("sensor_lag", (lag,), "{value}", "", positive=1)
+    since = tuple((Stretch("run_1", 4.0 * (k + 1)), Stretch("run_2")) for k in range(len(steps)))
+    every = {"run_1": 12.0, "run_2": 12.0}
+    change = Change(Group((lag,), np.zeros((0, 1)), late), since, (50.0,) * len(steps), every)
+    names = [p.name for p in change.candidate.parameters]
+    found = Estimates(dict(zip(names, steps, strict=True)), np.diag(np.full(len(steps), 1e-5**2)))
+    assert change.possible(found) is can_be
+    assert replace(change, group=replace(change.group, of=None)).possible(found)
 
 
 def without_a_load(spec: SessionSpec, mass: float, at: Array) -> SessionSpec:

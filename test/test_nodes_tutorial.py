@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shlex
 import sys
 from pathlib import Path
@@ -16,6 +15,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed: pip install '.[ros]
 from diagnostic_msgs.msg import DiagnosticArray
 from node_processes import Graph, Probe
 from ruamel.yaml import YAML
+from test_docs_pages import blocks
 
 PAGE = Path(__file__).parents[1] / "docs" / "tutorials" / "live-rig.md"
 CONFIG = Path(__file__).parents[1] / "config"
@@ -26,8 +26,7 @@ FIT = 400.0
 
 def lines() -> list[list[str]]:
     """Words of each command of the page, less those that start the graph."""
-    blocks = re.findall(r"^```sh\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-    every = [shlex.split(line) for block in blocks for line in block.splitlines()]
+    every = [shlex.split(line) for block in blocks(PAGE, "sh") for line in block.splitlines()]
     return [words for words in every if words[:2] != ["ros2", "launch"] and words[0] != "rig-identification"]
 
 

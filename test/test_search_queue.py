@@ -247,6 +247,15 @@ def test_a_twin_is_fitted_after_what_first_order_cannot_tell_from_it(
     assert begun_of(monkeypatch, [one, promise("b", 40.0)], {"one": 5.0}, UNLIMITED) == ["one", "twin", "b"]
 
 
+def test_a_twin_that_is_in_the_model_is_not_fitted_again() -> None:
+    """A part on springs that hides in a ceiling is asked beside that ceiling, and not the ceiling twice."""
+    ceiling = _candidate("ceiling")
+    one = promise("part", 50.0)
+    one = replace(one, candidate=replace(one.candidate, twins=((ceiling, {"ceiling.0": 2.0}),)))
+    assert [p.candidate.effect for p in expand._with_twins([one], ())] == ["part", "ceiling"]
+    assert [p.candidate.effect for p in expand._with_twins([one], (ceiling,))] == ["part"]
+
+
 def test_of_each_kind_a_few_of_the_best_promises_are_worth_a_fit() -> None:
     hinges = [
         replace(promise(f"h{k}", 100.0 - k), candidate=replace(_candidate(f"h{k}"), effect="hinge"))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, Stretch
 from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.mismatch.trial import ABSURD
 
 Array = NDArray[np.float64]
 
@@ -83,6 +84,16 @@ class Change:
             {**base.where, "times": times},
             tell=told,
         )
+
+    def possible(self, found: Estimates) -> bool:
+        """Whether what cannot be negative is not, after any of its steps. found: a fit with it."""
+        base = self.group.of
+        if base is None or base.positive == 0:
+            return True
+        own = [_own(self.group.numbers, step) for step in self.told_steps]
+        sums = [_summed(found, base.parameters, own[: k + 1]) for k in range(len(own))]
+        amounts = [p.name for p in base.parameters[: base.positive]]
+        return all(s.values[name] >= -ABSURD * s.std(name) for s in sums for name in amounts)
 
     def lasting(self, recordings: Mapping[str, float]) -> Change:
         """The same through further ``recordings``, which last so many s."""

@@ -220,7 +220,11 @@ def _fitted_best(fitted: Fitted, change: Change, notify: Notify) -> Changed | No
     notify(f"search: {candidate.label} that changes", 0.1)
     every = [(candidate, change), *((c.candidate, c) for c in _lasting(fitted, change))]
     fits = [(_fitted_with(fitted, change, told, notify), told, of) for told, of in every]
-    known = [Changed(again, told, own, of) for again, told, of in fits if again is not None]
+    known = [
+        Changed(again, told, own, of)
+        for again, told, of in fits
+        if again is not None and of.possible(estimates(again.problem, again.evaluation))
+    ]
     return min(known, key=lambda k: wrong(k.fitted), default=None)
 
 

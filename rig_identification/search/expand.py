@@ -351,7 +351,8 @@ def makes_sense(standing: Standing, problem: Problem) -> bool:
     trial = _last_of(standing)
     if not possible(trial):
         return False
-    return is_ordinary(trial) or beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
+    unknown_to_ideal = bool(trial.candidate.ordinary)
+    return unknown_to_ideal or beyond_doubt(trial, ordinary_errors(problem), ORDINARY)
 
 
 def _last_of(standing: Standing) -> Trial:

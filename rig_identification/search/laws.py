@@ -59,12 +59,13 @@ def in_words(best: Explained, found: list[Trial]) -> Explained:
         law_finding(best.fitted, law, f) if f.effect == law.effect and amount in f.parameters else f
         for f in best.mismatch.findings
     )
-    named = effects_of(findings)
-    text = best.mismatch.explanation.replace(effects_of(best.mismatch.findings), named, 1)
-    others = tuple(a for a in best.mismatch.alternatives if a["effect"] not in named.split(", "))
-    if named == effects_of(best.mismatch.findings):
-        others = best.mismatch.alternatives
-    told = replace(best.mismatch, explanation=text, findings=findings, alternatives=others)
+    told = replace(best.mismatch, findings=findings)
+    before, named = effects_of(best.mismatch.findings), effects_of(findings)
+    if named != before:
+        # The law has a name of the catalogue: other descriptions of that are no rivals
+        text = told.explanation.replace(before, named, 1)
+        others = tuple(a for a in told.alternatives if a["effect"] not in named.split(", "))
+        told = replace(told, explanation=text, alternatives=others)
     return replace(best, mismatch=told)
 
 
