@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from test_model_rigs import elements_of
 
-from rig_identification.estimate.sampling import Grid, node_values, smoothed_input
+from rig_identification.estimate.sampling import Grid, node_values
+from rig_identification.estimate.smoothing import WIDTHS, smoothed_input
 from rig_identification.model import layout
 from rig_identification.model.integrate import EXCITER_CLOCK
 from rig_identification.model.motion import Input, RigModel, State, on_cables, rig_model, simulate
@@ -97,7 +98,9 @@ def test_motion_of_the_engine_lies_within_the_tolerances(run: str) -> None:
         physics[entries[:-1]] += error[:-1]
         late = recording.exciter_force.time - time[0] - error[-1]
         force = node_values(grid, late, recording.exciter_force.values)
-        drive = Input(step, force, smoothed_input(grid, force).at(0.0, 1), np.zeros((grid.nodes, 6)))
+        drive = Input(
+            step, force, smoothed_input(step, force, WIDTHS[0]).at(0.0, 1), np.zeros((grid.nodes, 6))
+        )
         apart, J = errors(model.with_physics(physics), first, drive, entries, values)
         if iteration == 0:
             allowed = SIGMAS * np.sqrt(np.sum((J * std) ** 2, axis=2))

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d, median_filter, uniform_filter1d
+from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 from scipy.signal import savgol_coeffs, savgol_filter
 from scipy.sparse import csr_matrix
+
+from rig_identification.estimate.smoothing import SmoothInput, rate_noise, smoothed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -161,31 +162,6 @@ def jumps_of(nodes: Array, noise: float) -> Array:
 
 
 @dataclass(frozen=True)
-class SmoothInput:
-    """An input without its noise, at any time about the nodes: what a clock's offset moves along."""
-
-    spline: CubicSpline  # of s after the first node of the whole recording, (w,)
-    step: float  # s between nodes
-    first: float  # node of the recording that the input's own first node is; between two of wide nodes
-    nodes: int
-
-    def at(self, late: float, order: int = 0, between: float = 0.0) -> Array:
-        """(nodes, w) derivative of that order, ``late`` seconds after each node.
-
-        between: how far after the node itself, in steps. Beyond the recording the input goes on along a line.
-        """
-        edges = self.spline.x[[0, -1]]
-        time = self.step * (self.first + np.arange(self.nodes) + between) + late
-        inside = np.clip(time, *edges)
-        out = self.spline(inside, order)
-        if order == 0:
-            out = out + (time - inside)[:, None] * self.spline(inside, 1)
-        elif order > 1:
-            out[time != inside] = 0.0
-        return np.asarray(out)
-
-
-@dataclass(frozen=True)
 class NodeInput:
     """An input as the forward model takes it: at the nodes, midway between them, and how it changes."""
 
@@ -231,9 +207,8 @@ class NodeInput:
         rate, bend = self.smooth.at(late, 1), self.smooth.at(late, 2)
         if late == 0.0:
             return self.values, self.middle, rate, bend
-        curved = self.smooth.at(late, 2, 0.5) - self.smooth.at(0.0, 2, 0.5)
-        middle = self.middle - self.smooth.step**2 / 8.0 * curved
-        return self.values + self.smooth.at(late) - self.smooth.at(0.0), middle, rate, bend
+        moved = self.smooth.midway(late) - self.smooth.midway(0.0)
+        return self.values + self.smooth.at(late) - self.smooth.at(0.0), self.middle + moved, rate, bend
 
 
 def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInput:
@@ -246,11 +221,14 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     """
     line = node_values(grid, time, values)
     jumps = jumps_of(line, noise)
-    smooth = smoothed_input(grid, line)
-    if grid.nodes < 5:
-        return NodeInput(
-            line, np.zeros_like(line), smooth, jumps, np.zeros(grid.nodes), 0.0, rate_noise(grid.step)
-        )
+    at, middle = _as_curved(grid, time, line, jumps) if grid.nodes > 4 else (line, np.zeros_like(line))
+    smooth, width = smoothed(grid.step, at, time, values, noise)
+    of_rate = rate_noise(grid.step, width)
+    return NodeInput(at, middle, smooth, jumps, np.zeros(grid.nodes), 0.0, of_rate)
+
+
+def _as_curved(grid: Grid, time: Array, line: Array, jumps: Array) -> tuple[Array, Array]:
+    """(nodes, w) each: an input that curves at the nodes, and midway to the next beyond both's mean."""
     rough = np.any(jumps != 0.0, axis=1)[:, None]
     rough = maximum_filter1d(rough.astype(np.int8), 9, axis=0).astype(bool)
     curved = np.zeros_like(line)
@@ -262,37 +240,7 @@ def node_input(grid: Grid, time: Array, values: Array, noise: float) -> NodeInpu
     values = np.where(rough, line, line - over * curved)
     middle = np.zeros_like(line)
     middle[1:-2] = (values[1:-2] + values[2:-1] - values[:-3] - values[3:]) / 16.0
-    middle = np.where(rough, 0.0, middle)
-    return NodeInput(values, middle, smooth, jumps, np.zeros(grid.nodes), 0.0, rate_noise(grid.step))
-
-
-#: s, of the Gaussian that takes an input's noise off before it is differentiated, or moved in time.
-SMOOTHING = 0.015
-
-
-def smoothed_input(grid: Grid, nodes: Array) -> SmoothInput:
-    """A noisy input at the nodes (nodes, w), smoothed.
-
-    What a Gaussian takes off is put back once (Tukey's twicing): of 1.8 % at 2 Hz, which a clock's offset
-    would be wrong by, 0.03 % stays. It goes on beyond its ends turned about them, so that its slope there
-    is its own.
-    """
-    width = SMOOTHING / grid.step
-    ahead = min(grid.nodes - 1, int(np.ceil(8.0 * width)))
-    wide = np.pad(nodes, ((ahead, ahead), (0, 0)), mode="reflect", reflect_type="odd")
-    once = gaussian_filter1d(wide, width, axis=0)
-    twice = (2.0 * once - gaussian_filter1d(once, width, axis=0))[ahead : ahead + grid.nodes]
-    return SmoothInput(CubicSpline(grid.step * np.arange(grid.nodes), twice), grid.step, 0, grid.nodes)
-
-
-def rate_noise(step: float) -> float:
-    """Variance (1/s2) of the smoothed input's rate, in that of the white noise of its nodes ``step`` apart.
-
-    Twicing a Gaussian of width s leaves H = 2 g - g^2 of a frequency w, g = exp(-(w s)^2 / 2), and the
-    integral of (w H)^2 over all of them is sqrt(pi)/4 (4 - 4 / 1.5^1.5 + 1 / 2^1.5) / s^3.
-    """
-    integral = np.sqrt(np.pi) / 4.0 * (4.0 - 4.0 / 1.5**1.5 + 1.0 / 2.0**1.5)
-    return float(integral / SMOOTHING**3 / (np.pi / step))
+    return values, np.where(rough, 0.0, middle)
 
 
 #: Nodes between two of the samples whose weights are looked at: none reaches that far.

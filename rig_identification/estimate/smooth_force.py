@@ -21,13 +21,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicSpline
-from scipy.ndimage import uniform_filter1d
-from scipy.signal.windows import hann
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from rig_identification.estimate.band_limited import highest_cutoff
-from rig_identification.estimate.sampling import Grid, NodeInput, SmoothInput, sample_noise_std
+from rig_identification.estimate.sampling import Grid, NodeInput, sample_noise_std
+from rig_identification.estimate.smoothing import SmoothInput, noise_alone
 
 Array = NDArray[np.float64]
 
@@ -36,13 +35,10 @@ CUTOFFS = 3.0 * 2.0 ** (np.arange(11) / 3.0)
 #: What is left at the lowest that leaves noise alone may still hide a trace; c is taken by so much higher,
 #: which leaves a sixth of a line.
 HIGHER = 1.25
-#: What white noise does in one of some thousand: in nats beyond the logarithm of their number the loudest
-#: line of its spectrum and half the square of the largest mean; and a second's mean square, in its own stds.
-LOUD, WORST = 7.0, 5.0
 #: Factor on the noise that is estimated from the samples themselves, which is off by some percents.
 QUIETER = 1.1
-#: Fewest samples of a force that is smoothed, and of a window that counts as a second.
-FEW, SHORT = 64, 16
+#: Fewest samples of a force that is smoothed.
+FEW = 64
 
 
 def smooth_force(grid: Grid, time: Array, values: Array, noise: Array) -> NodeInput | None:
@@ -61,7 +57,7 @@ def smooth_force(grid: Grid, time: Array, values: Array, noise: Array) -> NodeIn
     splines = _Splines(grid, time)
     for cutoff in CUTOFFS[highest_cutoff(grid.step) / HIGHER >= CUTOFFS]:
         left = values - splines.design @ splines.fitted(values, cutoff)
-        if _noise_alone(time, left / noise, cutoff):
+        if noise_alone(time, left / noise, cutoff):
             return _input(splines, splines.fitted(values, HIGHER * cutoff), HIGHER * cutoff)
     return None
 
@@ -89,27 +85,6 @@ class _Splines:
         """(nodes, w) values at the nodes."""
         nodes = self.grid.step * np.arange(self.grid.nodes)
         return np.asarray(BSpline(self.knots, coefficients, 3)(nodes))
-
-
-def _noise_alone(time: Array, left: Array, cutoff: float) -> bool:
-    """Whether residuals (n, w), in units of their noise, are no louder anywhere than white noise.
-
-    Over a second, along the whole recording as a line of the spectrum, and about an instant, such as a
-    kink's, as a mean over half a cycle of ``cutoff`` Hz or less.
-    """
-    count = time.size
-    rate = count / max(float(time[-1] - time[0]), 1.0)
-    second = max(SHORT, round(rate))
-    square = uniform_filter1d(left**2, second, axis=0)[second // 2 : count - second // 2]
-    if np.max(square, initial=0.0) > 1.0 + WORST * np.sqrt(2.0 / second):
-        return False
-    window = hann(count)[:, None]
-    lines = np.abs(np.fft.rfft(window * left, axis=0)) ** 2 / np.sum(window**2)
-    if np.max(lines) > np.log(lines.size) + LOUD:
-        return False
-    widths = 2 ** np.arange(1 + int(np.log2(max(1.0, rate / (2.0 * cutoff)))))
-    loudest = max(width * float(np.max(uniform_filter1d(left, width, axis=0) ** 2)) for width in widths)
-    return bool(loudest < 2.0 * (np.log(left.size) + LOUD))
 
 
 def _input(splines: _Splines, coefficients: Array, cutoff: float) -> NodeInput:
