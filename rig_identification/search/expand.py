@@ -371,7 +371,7 @@ def _with_twins(promises: list[Promise], found: tuple[Candidate, ...]) -> Iterat
 
 
 def worthy(promises: list[Promise], count: int) -> list[Promise]:
-    """The promises worth a fit: of each kind the best ones, as many as are fitted."""
+    """The promises worth a fit: of each kind and size the best ones, as many as are fitted."""
     out: list[Promise] = []
     for promise in sorted(promises, key=lambda p: -net_gain(p, count)):
         if net_gain(promise, count) <= 0.0 or len(out) == FITTED:
@@ -380,9 +380,14 @@ def worthy(promises: list[Promise], count: int) -> list[Promise]:
             break
         if stood_for(promise, promises, count):
             continue
-        if sum(promise.candidate.kind == other.candidate.kind for other in out) < ALIKE:
+        if sum(_alike_in_size(promise.candidate, other.candidate) for other in out) < ALIKE:
             out.append(promise)
     return out
+
+
+def _alike_in_size(one: Candidate, other: Candidate) -> bool:
+    """Whether two are of one kind and size: a part that moves one way, or three, or turns besides, are not."""
+    return one.kind == other.kind and len(one.parameters) == len(other.parameters)
 
 
 def _entered(
