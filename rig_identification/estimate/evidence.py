@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ from rig_identification.estimate.sampling import (
 from rig_identification.estimate.smooth_force import smooth_force
 from rig_identification.recording import Part, Recording, Series
 from rig_identification.rig import Rig
+
+if TYPE_CHECKING:
+    from rig_identification.estimate.noise_at_rest import Colour
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -93,6 +97,7 @@ class Channel:
     felt: float = 1.0  # std of the exciter's noise that a group feels at once, in that of an interval's mean
     wander: Array | None = None  # (w,) std of a tracker's error that goes with the pose (pose_error.py)
     slow: Array | None = None  # (w,) factor on the noise at the motion's frequencies (noise_at_rest.py)
+    colour: Colour | None = None  # that noise at every frequency
 
     @property
     def width(self) -> int:
@@ -129,6 +134,17 @@ class Channel:
             return slice(None)
         first, last = np.searchsorted(self.time, [start, end])
         return slice(max(0, int(first) - 1), int(last) + 2)
+
+    def power_of_noise(self, axis: int, frequency: Array) -> Array:
+        """(n,) that one of its axes has at frequencies (n,) Hz, in that of the white noise it is taken for.
+
+        Not below 1: noise that is quieter in one recording than at rest is no evidence of anything.
+        """
+        if self.colour is None or self.slow is None:
+            return np.ones_like(frequency)
+        place = self.axes.index(axis)
+        power = self.colour.power(frequency)[:, place] / self.slow[place] ** 2
+        return np.asarray(np.maximum(power, 1.0))
 
     @cached_property
     def grouped(self) -> Array:

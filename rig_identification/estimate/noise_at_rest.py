@@ -9,12 +9,15 @@ Biometrika 60, 1973), which all axes of a device share beside a level of their o
 ordinates over bands: one is ln 2 times the mean (exponential law), and neither a residual swing nor a line of
 the mains moves it. So every frequency tells of the few at which the body moves. Load cells of one make share
 their cosines too, where that describes them all as well as cosines of each.
+
+A fit weighs each channel of a run by the noise at the frequencies at which that channel moves; what it leaves
+is compared with the noise at each frequency (verdict.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -37,14 +40,15 @@ COSINES = 3
 #: spectrum has to be above what is described.
 MEDIAN_STD, CHANCE = 1.44, 3.0
 
+TINY = float(np.finfo(np.float64).tiny)
 #: Device and quantity.
 Key = tuple[str, str]
 #: ... of the exciter's force, which drives the model.
 FORCE: Key = ("exciter", "exciter_force")
 
 
-def slow_noise(rests: Iterable[RestEvidence], exciter_noise: float = 0.0) -> dict[Key, Array]:
-    """By device and quantity the factor (w,) on the noise of what is measured at rest; none where it is 1.
+def slow_noise(rests: Iterable[RestEvidence], exciter_noise: float = 0.0) -> dict[Key, Colour]:
+    """By device and quantity the noise of what is measured at rest; none where it may as well be white.
 
     exciter_noise: std (N) of a sample of the exciter's force; 0: it is not measured.
     """
@@ -60,30 +64,51 @@ def slow_noise(rests: Iterable[RestEvidence], exciter_noise: float = 0.0) -> dic
             part = _bands(force, np.full(force.values.shape[1], exciter_noise))
             if part is not None:
                 found.setdefault(FORCE, []).append(part)
-    factors: dict[Key, Array] = {}
+    colours: dict[Key, Colour] = {}
     for quantity in {quantity for _, quantity in found}:
         devices = {key: parts for key, parts in found.items() if key[1] == quantity}
         alone = [_fitted({key: parts}) for key, parts in devices.items()]
         alike = _fitted(devices)
         chosen = [alike] if alike.criterion < sum(fit.criterion for fit in alone) else alone
-        factors |= {key: factor for fit in chosen for key, factor in fit.factors.items()}
-    return {key: factor for key, factor in factors.items() if np.any(factor > 1.0)}
+        colours |= {key: colour for fit in chosen for key, colour in fit.colours.items()}
+    return {key: colour for key, colour in colours.items() if np.any(colour.shown)}
 
 
-def with_slow_noise(runs: tuple[Run, ...], factors: dict[Key, Array]) -> tuple[Run, ...]:
-    """Runs whose channels are as noisy at the motion's frequencies as they are at rest."""
+def with_slow_noise(runs: tuple[Run, ...], colours: dict[Key, Colour]) -> tuple[Run, ...]:
+    """Runs whose channels are as noisy at their motion's frequencies as they are at rest."""
 
     def louder(run: Run) -> Run:
-        channels = tuple(
-            replace(c, slow=factors[c.device, c.quantity])
-            if (c.device, c.quantity) in factors and factors[c.device, c.quantity].size == c.width
-            else c
-            for c in run.channels
-        )
-        exciter = run.exciter_noise * float(np.max(factors.get(FORCE, 1.0)))
-        return replace(run, channels=channels, exciter_noise=exciter)
+        channels = []
+        for c in run.channels:
+            colour = colours.get((c.device, c.quantity))
+            if colour is None or colour.level.size != c.width:
+                channels.append(c)
+                continue
+            slow = np.sqrt(_where_it_moves(Series(c.time, c.values), c.noise, colour))
+            channels.append(replace(c, slow=slow, colour=colour) if np.any(slow > 1.0) else c)
+        force, colour = run.recording.exciter_force, colours.get(FORCE)
+        if colour is None or force is None or run.exciter_noise <= 0.0:
+            return replace(run, channels=tuple(channels))
+        std = np.full(force.values.shape[1], run.exciter_noise)
+        loudest = float(np.sqrt(np.max(_where_it_moves(force, std, colour))))
+        return replace(run, channels=tuple(channels), exciter_noise=run.exciter_noise * loudest)
 
-    return tuple(map(louder, runs)) if factors else runs
+    return tuple(map(louder, runs)) if colours else runs
+
+
+def _where_it_moves(series: Series, noise: Array, colour: Colour) -> Array:
+    """(w,) power of the noise at the frequencies of what samples (n, w) measure, in that of white noise.
+
+    A signal of power P(f) in noise of power S(f) tells as much as in white noise of sum P / sum (P / S)
+    (Whittle's likelihood).
+    """
+    part = _spectrum(series, noise)
+    if part is None:
+        return np.exp(np.maximum(colour.mean, 0.0))
+    frequency, power = part
+    loud = colour.power(frequency)
+    signal = np.maximum(power - loud, 0.0)
+    return np.asarray(np.sum(signal, axis=0) / np.maximum(np.sum(signal / loud, axis=0), TINY))
 
 
 def told(runs: Iterable[Run]) -> tuple[str, ...]:
@@ -104,13 +129,31 @@ class Bands(NamedTuple):
     power: Array  # (b, w) of each axis
     ordinates: Array  # (b,) in each
     moving: float  # angle up to which a rig moves
+    step: float  # s from one sample to the next
+
+
+@dataclass(frozen=True)
+class Colour:
+    """A noise's spectrum: the logarithm of its power (in that of white noise) is a sum of cosines."""
+
+    step: float  # s from one sample to the next
+    level: Array  # (w,) of each axis
+    cosines: Array  # (k,) of once, twice, ... the angle from one sample to the next
+    shown: NDArray[np.bool_]  # (w,) whether an axis is louder than described at frequencies of motion
+    mean: Array  # (w,) of the logarithm over those frequencies
+
+    def power(self, frequency: Array) -> Array:
+        """(n, w) at frequencies (n,) Hz; 1 where noise is quieter, and where more may be chance."""
+        angle = np.minimum(2.0 * np.pi * frequency * self.step, np.pi)
+        shape = _cosines(angle, self.cosines.size) @ self.cosines
+        return np.where(self.shown, np.exp(np.maximum(shape[:, None] + self.level, 0.0)), 1.0)
 
 
 class Fit(NamedTuple):
     """Spectra of devices that share their cosines."""
 
     criterion: float  # Schwarz's, less what levels cost
-    factors: dict[Key, Array]  # (w,) on the std of a sample; 1 where it may as well be as described
+    colours: dict[Key, Colour]
 
 
 def _fitted(devices: dict[Key, list[Bands]]) -> Fit:
@@ -137,7 +180,7 @@ def _fitted(devices: dict[Key, list[Bands]]) -> Fit:
             best = criterion, found, inverse
     assert best is not None
     criterion, found, inverse = best
-    factors = {}
+    colours = {}
     for k, (key, parts) in enumerate(devices.items()):
         there = np.linspace(0.0, min(part.moving for part in parts), 9)
         own = np.eye(first[-1])[first[k] : first[k + 1]]
@@ -147,8 +190,8 @@ def _fitted(devices: dict[Key, list[Bands]]) -> Fit:
         # Axes of one device share its electronics: where all of them together are above, each is
         shown = [_shown(row, found, inverse) for row in rows]
         told = np.array(shown) | _shown(np.mean(rows, axis=0), found, inverse)
-        factors[key] = np.where(told, np.exp(0.5 * np.maximum(above, 0.0)), 1.0)
-    return Fit(criterion, factors)
+        colours[key] = Colour(parts[0].step, found[first[k] : first[k + 1]], found[first[-1] :], told, above)
+    return Fit(criterion, colours)
 
 
 def _shown(row: Array, found: Array, inverse: Array) -> bool:
@@ -178,25 +221,36 @@ def _series(recording: Recording, device: str, quantity: str) -> Series | None:
 
 
 def _bands(series: Series, noise: Array) -> Bands | None:
-    """The spectrum of samples in units of their noise; None of too few to tell.
-
-    A sample that is missing here and there is drawn between its neighbours.
-    """
-    step = float(np.median(np.diff(series.time))) if series.time.size > 2 * FEWEST * BAND else 0.0
-    if step <= 0.0 or noise.size != series.values.shape[1]:
+    """The spectrum of samples at rest by bands; None of too few to tell."""
+    part = _spectrum(series, noise)
+    if part is None:
         return None
-    time = np.arange(series.time[0], series.time[-1], step)
-    even = np.stack([np.interp(time, series.time, v) for v in series.values.T], axis=1) / noise
-    # A straight line leaks into all that is slow
-    power = np.abs(np.fft.rfft(detrend(even, axis=0), axis=0)) ** 2 / time.size
-    angle = 2.0 * np.pi * np.fft.rfftfreq(time.size)
+    frequency, power = part
+    step = 0.5 / float(frequency[-1])
+    angle = 2.0 * np.pi * step * frequency
     kept = np.array_split(np.arange(DRIFTING + 1, angle.size - 1), max(1, (angle.size - DRIFTING) // BAND))
     if len(kept) < FEWEST:
         return None
     medians = np.stack([np.median(power[band], axis=0) for band in kept]) / np.log(2.0)
     return Bands(
         np.array([np.mean(angle[band]) for band in kept]),
-        np.maximum(medians, np.finfo(np.float64).tiny),
+        np.maximum(medians, TINY),
         np.array([band.size for band in kept], dtype=np.float64),
         2.0 * np.pi * min(MOTION * step, SHARE),
+        step,
     )
+
+
+def _spectrum(series: Series, noise: Array) -> tuple[Array, Array] | None:
+    """Frequencies (n,) Hz and power (n, w) of samples, in that of white noise; None of too few to tell.
+
+    A sample that is missing here and there is drawn between its neighbours.
+    """
+    step = float(np.median(np.diff(series.time))) if series.time.size > 2 * FEWEST * BAND else 0.0
+    if step <= 0.0 or noise.size != series.values.shape[1] or not np.all(noise > 0.0):
+        return None
+    time = np.arange(series.time[0], series.time[-1], step)
+    even = np.stack([np.interp(time, series.time, v) for v in series.values.T], axis=1) / noise
+    # A straight line leaks into all that is slow
+    power = np.abs(np.fft.rfft(detrend(even, axis=0), axis=0)) ** 2 / time.size
+    return np.asarray(np.fft.rfftfreq(time.size, step)), power

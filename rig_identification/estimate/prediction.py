@@ -19,7 +19,7 @@ from rig_identification.estimate.parameters import MOUNT_SIZE, MOUNTED, DeviceLa
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
-from rig_identification.estimate.wander import wander_of
+from rig_identification.estimate.wander import MOVES, wander_of, zero_moves
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors, work
 from rig_identification.model.constraints import rigid_jacobian
@@ -341,7 +341,7 @@ def linearise_run(
     H, D = np.empty((size, motion.states.shape[1])), np.empty((size, 6))
     wandering = [wander_of(bench.rig, c.quantity) for c in run.channels]
     count = zero = 1 + known + starts
-    zeros = sum(c.width for c, std in zip(run.channels, wandering, strict=True) if std > 0.0)
+    zeros = MOVES * sum(c.width for c, std in zip(run.channels, wandering, strict=True) if std > 0.0)
     columns = np.empty((size, count + zeros))
     columns[:, count:] = 0.0
     readings: dict[str, sensors.Reading] = {}
@@ -366,9 +366,10 @@ def linearise_run(
         H[here], D[here] = in_state.reshape(spread.size, -1), in_wrench.reshape(spread.size, 6)
         columns[here, :count] = rows.reshape(spread.size, -1)
         if wandering[index] > 0.0:
+            moved = wandering[index] * zero_moves(run, channel)
             for k in range(channel.width):
-                columns[here[k :: channel.width], zero] = wandering[index]
-                zero += 1
+                columns[here[k :: channel.width], zero : zero + MOVES] = moved
+                zero += MOVES
     plain = columns[:, 0].copy()
     A, B, _, _, _ = motion.derivatives
     acts = extra_noise is not None or latent is not None or discrepancy is not None

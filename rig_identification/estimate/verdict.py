@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,7 +53,7 @@ def residual_witnesses(run: Run, linearised: Linearised, residual: Array) -> lis
             axis = channel.axis_name(a)
             out += [
                 Witness(run.recording.name, channel.device, axis, band)
-                for band in bands(residual[rows], rate)
+                for band in bands(residual[rows], rate, partial(channel.power_of_noise, a))
             ]
     return out
 

@@ -1,4 +1,4 @@
-"""Is a residual white? Band power of its periodogram against what white noise has.
+"""Is a residual noise? Band power of its periodogram against what its noise has.
 
 Under the model the whitened residuals of a channel are independent with unit variance, so each
 ordinate of the normalised periodogram is exponential with mean one (Brockwell & Davis,
@@ -10,6 +10,7 @@ say, at frequencies that it does not have), which is nothing against the model.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,13 +30,18 @@ class Band:
     log10_p: float  # log10 of the probability that white noise has as much
 
 
-def bands(residual: Array, rate: float) -> list[Band]:
-    """Power of ``residual`` (n,), sampled at ``rate`` Hz, in bands that double in width from low to high."""
+def bands(residual: Array, rate: float, noise: Callable[[Array], Array] | None = None) -> list[Band]:
+    """Power of ``residual`` (n,), sampled at ``rate`` Hz, in bands that double in width from low to high.
+
+    noise: its power at frequencies (n,) Hz, in that of white noise; none: it is white.
+    """
     n = residual.size
     if n < 64:
         return []
     spectrum = np.abs(np.fft.rfft(residual - np.mean(residual))) ** 2 / n
     ordinates = spectrum[1 : (n - 1) // 2 + 1]
+    if noise is not None:
+        ordinates = ordinates / noise(np.arange(1, ordinates.size + 1) * rate / n)
     # The median ordinate of white noise is ln 2 times the mean one; lines do not move it
     typical = float(np.median(ordinates)) / np.log(2.0)
     if not typical > 0.0:
