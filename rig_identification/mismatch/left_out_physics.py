@@ -28,6 +28,8 @@ from rig_identification.rig import Rig
 
 #: Std of the logarithm of the rate at which dry hinges creep: a factor of three to either side.
 CREEP_SPREAD = 1.1
+#: ... and of the share in which hinges resist being twisted, about that of ball joints.
+TWIST_SPREAD = 0.5
 #: m: a cable's torsional stiffness, as a share of the weight that it helps to carry. A steel rope of a
 #: centimetre, two metres long, has some 5 N m/rad, a rod of that size 40: parts in a thousand of 10 kN.
 TWISTED = 0.005
@@ -106,41 +108,55 @@ def _hinges(rig: Rig, mass: float, block: int) -> list[Candidate]:
     damping = 0.1 * mass * length * np.sqrt(rig.gravity * length) / (2 * n)
     friction = 0.003 * mass * rig.gravity / n
     creep = replace(added("hinge.creep", "rad/s", CREEP_SPREAD, block + place.CREEP, CREEP_RATE), ratio=True)
+    twist = added("hinge.twist", "1", TWIST_SPREAD, block + place.HINGE_TWIST, 1.0)
     shared = (damping, block + place.DAMPING), (friction, block + place.FRICTION)
-    out = _hinges_of("hinge", None, *shared, creep)
+    out = _hinges_of("hinge", None, *shared, creep, twist)
     for i, cable in enumerate(rig.cables):
         o, own = layout.cable_offset(i), f"{cable.name}.hinge"
         entries = (n * damping, o + layout.HINGE_DAMPING), (n * friction, o + layout.HINGE_FRICTION)
-        out += _hinges_of(own, cable.name, *entries, creep)
+        out += _hinges_of(own, cable.name, *entries, creep, twist)
     return out
 
 
 def _hinges_of(
-    name: str, channel: str | None, damping: tuple[float, int], friction: tuple[float, int], creep: Parameter
+    name: str,
+    channel: str | None,
+    damping: tuple[float, int],
+    friction: tuple[float, int],
+    creep: Parameter,
+    twist: Parameter,
 ) -> list[Candidate]:
     """Both of some cables. damping, friction: how much is plausible, and its entry in the physics."""
+    viscous = added(f"{name}.damping", "N*m*s/rad", *damping)
     rubbing = added(f"{name}.friction", "N*m", *friction)
+
+    def damps(found: Estimates) -> Told:
+        return {
+            "damping": (*found.of(viscous.name), "N*m*s/rad"),
+            "twist_share": (*found.of(twist.name), "1"),
+        }
 
     def told(found: Estimates) -> Told:
         return {
             "torque": (*found.of(rubbing.name), "N*m"),
             "creep_rate": (*found.of(creep.name), "rad/s"),
+            "twist_share": (*found.of(twist.name), "1"),
         }
 
     whose = "The cables' hinges" if channel is None else "The hinges of {channel} alone"
     return [
         Candidate(
             "hinge_damping",
-            (added(f"{name}.damping", "N*m*s/rad", *damping),),
+            (viscous, twist),
             f"{whose} damp the motion: each puts {{value}} against the rate at which it turns.",
             "Use knife edges or ball joints, or keep the damping in the model.",
             {"channel": channel, "axis": None},
             positive=1,
-            name_in_result="damping",
+            tell=damps,
         ),
         Candidate(
             "hinge_friction",
-            (rubbing, creep),
+            (rubbing, creep, twist),
             f"{whose} rub: each holds against turning with {{value}}.",
             "Grease or replace the hinges; dry friction spoils small motions most.",
             {"channel": channel, "axis": None},

@@ -16,6 +16,7 @@ from rig_identification.model.effects.own import code_of
 from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
+    HINGE_TWIST,
     LINEAR_DENSITY,
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
@@ -129,6 +130,7 @@ def rig_model(
         physics[o + layout.CELL_AT_CEILING] = float(cable.load_cell == "ceiling")
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
     physics[layout.effects_offset(n) + CREEP] = CREEP_RATE
+    physics[layout.effects_offset(n) + HINGE_TWIST] = 1.0
     physics[layout.effects_offset(n) + LINEAR_DENSITY] = rig.cable_linear_density or 0.0
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     for k, effect in enumerate(own_effects()):
