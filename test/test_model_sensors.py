@@ -173,11 +173,19 @@ def test_a_cell_with_play_reads_behind_the_load_on_either_branch() -> None:
 
 @pytest.mark.parametrize("settling", [0.0, 1e-6, 0.3, -0.05])
 def test_drift(settling: float) -> None:
-    time, device = np.linspace(0.0, 40.0, 9), np.array([0.5, settling, -0.2, 0.1])
-    values, derivatives = sensors.drift(time, device)
+    """The zero, and the gain of what is read; each derivative as differences have it."""
+    time, device = np.linspace(0.0, 40.0, 9), np.array([0.5, settling, 0.0, -0.2, 0.1, 2e-3])
+    values = sensors.drift(time, device).zero
     fine = np.linspace(0.0, 40.0, 40001)
     rate = 0.5 * np.exp(-settling * fine)
     moved = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(fine))])
     np.testing.assert_allclose(values[:, 0], np.interp(time, fine, moved), rtol=1e-6, atol=1e-9)
-    numeric = slope(lambda d: sensors.drift(time, d)[0], device)
-    np.testing.assert_allclose(derivatives(), numeric, rtol=1e-5, atol=1e-5)
+    read = np.stack([np.cos(time), 100.0 + np.sin(time)], axis=1)
+    nothing = sensors.Reading(read, np.ones((9, 2, 3)), lambda: np.ones((9, 2, 1)))
+    reading = sensors.drifting(nothing, time, device)
+    shape = (1.0 - np.exp(-0.1 * time)) / 0.1
+    np.testing.assert_allclose(reading.values[:, 1], read[:, 1] * (1.0 + 2e-3 * shape) - 0.2 * shape)
+    np.testing.assert_allclose(reading.in_raw[:, 1, 0], 1.0 + 2e-3 * shape)
+    np.testing.assert_allclose(reading.in_device[:, 1, 0], 1.0 + 2e-3 * shape)
+    numeric = slope(lambda d: sensors.drifting(nothing, time, d).values, device)
+    np.testing.assert_allclose(reading.in_device[:, :, 1:], numeric, rtol=1e-5, atol=1e-4)

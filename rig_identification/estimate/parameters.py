@@ -151,7 +151,7 @@ class DeviceLayout:
 
         ``cable_1.load_cell_curve``, ``_hysteresis`` and ``_play``, ``cable_1.feels.cable_2``,
         ``imu.gyroscope.x.feels.accelerometer.y``, and
-        ``cable_1.drift``, ``imu.angular_rate.drift.x``, each with ``.settling``.
+        ``cable_1.drift``, ``imu.angular_rate.drift.x``, each with ``.settling`` and ``.gain``.
         """
         out: dict[str, int] = {}
         drifting = {c: [f"{c}.drift"] for c in self.cables}
@@ -174,6 +174,7 @@ class DeviceLayout:
             for i, name in enumerate(names):
                 out[name] = self.drift(device).start + devices.DRIFT_SIZE * i
                 out[f"{name}.settling"] = out[name] + 1
+                out[f"{name}.gain"] = out[name] + devices.DRIFT_GAIN
         return out
 
     def first(self, device: str) -> int:

@@ -68,7 +68,8 @@ def _tells(finding: Finding, trial: Trial) -> bool:
     where = trial.candidate.where
     same = all(finding.where.get(key) == value for key, value in where.items() if key != "axis")
     own = {q.name for q in trial.candidate.parameters}
-    return same and (finding.effect == trial.candidate.effect or bool(own & finding.numbers.keys()))
+    # A law may be told by another name; a number may be of two effects, as how much hinges twist
+    return same and (finding.effect == trial.candidate.effect or own <= finding.numbers.keys())
 
 
 def _own_evidence(

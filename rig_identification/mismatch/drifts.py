@@ -1,8 +1,9 @@
-"""Zeros that move while a recording lasts, which the contract's table has no word for.
+"""Zeros and gains that move while a recording lasts, which the contract's table has no word for.
 
 A load cell, an amplifier, a gyroscope that warms up: each recording's zero is what it was when the recording
-began, and moves at a rate that may settle (model/sensors.drift). What moves differently in each recording is
-no law: the held-out run refutes it.
+began, and moves at a rate that may settle (model/sensors.drift). A bridge that warms up moves its gain alike:
+what hangs still tells the two apart as little as one reading does, what swings by as much as it swings. What
+moves differently in each recording is no law: the held-out run refutes it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
-from rig_identification.estimate.wander import wander_of
+from rig_identification.estimate.wander import WANDER, wander_of
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import sensors
 from rig_identification.rig import Rig
@@ -25,6 +26,17 @@ IMU = (
 INCLINOMETER = tuple(("inclination", a, "rad", 5e-4) for a in "xy")
 #: How fast drifts settle, 1/s: from hardly within a recording to within seconds.
 SETTLING, SETTLING_SPREAD = 0.05, 0.1
+#: Plausible rate of a gain (std of the prior), 1/s: half a percent in ten seconds.
+GAIN = 5e-4
+#: Tolerance of each quantity's gain.
+GAINS = {
+    "tension": "load_cell_gain",
+    "angular_rate": "gyroscope_scale",
+    "specific_force": "accelerometer_scale",
+}
+#: By what name the result has a drift, of what it is, and what to do.
+ZERO = ("drift", "zero", "Let it warm up before recording, and zero it then.")
+SCALE = ("gain_drift", "gain", "Let it warm up before recording, and calibrate it then.")
 
 
 def drifts(rig: Rig, parameters: ParameterSet, devices: list[str], duration: float) -> list[Candidate]:
@@ -43,8 +55,14 @@ def drifts(rig: Rig, parameters: ParameterSet, devices: list[str], duration: flo
                 ),
             )
             where: dict[str, object] = {"channel": device, "axis": axis, "quantity": quantity, "law": "drift"}
-            ordinary = wander_of(rig, quantity) / max(duration, 1.0)
-            out.append(_drift(own, unit, duration, where, ordinary))
+            lasts = max(duration, 1.0)
+            out.append(_drift(own, unit, duration, where, wander_of(rig, quantity) / lasts, ZERO))
+            of_gain = Parameter(
+                f"{name}.gain", "1/s", 0.0, GAIN, "device", laws[f"{name}.gain"], bounded=False
+            )
+            known = WANDER * rig.tolerance.get(GAINS.get(quantity, ""), 0.0) / lasts
+            where = {**where, "law": "gain drift"}
+            out.append(_drift((of_gain, own[1]), "1", duration, where, known, SCALE))
     return out
 
 
@@ -54,16 +72,19 @@ def _drift(
     duration: float,
     where: dict[str, object],
     ordinary: float,
+    words: tuple[str, str, str],
 ) -> Candidate:
-    """A drift. ordinary: rate at which every such zero wanders within a recording."""
+    """A drift. ordinary: rate at which every such number wanders in a recording; words: how it is told."""
     rate, settling = own
+    name, what, advice = words
 
-    def moved(*numbers: float) -> float:
-        return float(sensors.drift(np.array([duration]), np.array(numbers))[0][0, 0])
+    def moved(at_first: float, settles: float) -> float:
+        device = np.array([at_first, settles, 0.0])
+        return float(sensors.drift(np.array([duration]), device).zero[0, 0])
 
     def told(found: Estimates) -> Told:
         return {
-            "drift": (*found.following(moved, rate.name, settling.name), unit),
+            name: (*found.following(moved, rate.name, settling.name), unit),
             "settling_rate": (*found.of(settling.name), "1/s"),
         }
 
@@ -71,8 +92,8 @@ def _drift(
     return Candidate(
         "unknown",
         own,
-        f"The zero of {{channel}}'s {which} drifts: by {{value}} in {duration:.3g} s.",
-        "Let it warm up before recording, and zero it then.",
+        f"The {what} of {{channel}}'s {which} drifts: by {{value}} in {duration:.3g} s.",
+        advice,
         where,
         tell=told,
         ordinary={rate.name: ordinary},

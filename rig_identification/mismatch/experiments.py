@@ -59,6 +59,7 @@ _EXPERIMENTS = {
     "unknown curvature": "load that cell alone, with several known weights over its range",
     "unknown cross-sensitivity": "load one cell, or turn and tilt about one axis, alone: no other reads it",
     "unknown drift": "leave all at rest for as long as a recording takes: what drifts does so by itself",
+    "unknown gain drift": "hang a known weight on it for as long as a recording takes",
 }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -72,8 +73,8 @@ def _mixed(pure: Reading, shares: Array) -> Reading:
     return Reading(own.values, own.in_raw, in_device)
 
 
-#: drift, of each axis: rate, unit/s, and how fast it settles, 1/s
-DRIFT_SIZE = 2
+#: drift, of each axis: rate of its zero, unit/s, how fast it settles, 1/s, and rate of its gain, 1/s
+DRIFT_SIZE, DRIFT_GAIN = 3, 2
 #: Below this change over the time asked for a drift is as good as a straight line.
 STRAIGHT = 1e-4
 
@@ -88,46 +89,52 @@ def _drift_shapes(time: Array, k: float) -> tuple[Array, Array]:
     return shape, time**2 * np.where(straight, x / 3.0 - 0.5, (fading * (1.0 + x) - 1.0) / safe**2)
 
 
-def drift(time: Array, device: Array) -> tuple[Array, Callable[[], Array]]:
-    """What the zeros of a device's axes have moved by (N, w), and what gives its derivatives (N, w, 2 w).
+class Drift(NamedTuple):
+    """What a device's axes do with time: (N, w) each."""
 
-    time (N,): s after a recording's start. device (2 w,): of each axis the rate r at first, unit/s, and how
-    fast k it settles, 1/s. A part that warms up towards its surroundings moves by r (1 - exp(-k t)) / k;
-    where it does not settle within the recording, by r t.
+    zero: Array  # what is read beside what is measured
+    gain: Array  # share of what is measured that is read besides
+    shape: Array  # of a unit rate, of either
+    bend: Array  # its derivative in how fast it settles
+
+
+def drift(time: Array, device: Array) -> Drift:
+    """How the zeros and gains of a device's axes have moved.
+
+    time (N,): s after a recording's start. device (3 w,): of each axis the rate r of its zero at first,
+    unit/s, how fast k it settles, 1/s, and the rate of its gain, 1/s. A part that warms up towards its
+    surroundings moves by r (1 - exp(-k t)) / k; where it does not settle within the recording, by r t.
     """
-    rates, settling = device.reshape(-1, DRIFT_SIZE).T
-    values = np.zeros((time.size, rates.size))
-    for axis in np.flatnonzero(rates):
-        values[:, axis] = rates[axis] * _drift_shapes(time, settling[axis])[0]
-
-    def derivatives() -> Array:
-        out = np.zeros((time.size, rates.size, device.size))
-        for axis, (rate, k) in enumerate(zip(rates, settling, strict=True)):
-            shape, bend = _drift_shapes(time, k)
-            out[:, axis, DRIFT_SIZE * axis] = shape
-            out[:, axis, DRIFT_SIZE * axis + 1] = rate * bend
-        return out
-
-    return values, derivatives
+    rates, settling, gains = device.reshape(-1, DRIFT_SIZE).T
+    shapes = [_drift_shapes(time, k) for k in settling]
+    shape, bend = np.stack([s for s, _ in shapes], axis=1), np.stack([b for _, b in shapes], axis=1)
+    return Drift(rates * shape, gains * shape, shape, bend)
 
 
 def drifting(reading: Reading, time: Array, device: Array) -> Reading:
-    """A reading whose zeros move with time (:func:`drift`); one of the mean where it has a single row.
+    """A reading whose zeros and gains move with time (:func:`drift`); their mean where it has a single row.
 
     The derivatives in ``device`` come after the device's other numbers.
     """
-    values, derivatives = drift(time, device)
-    single = reading.values.shape[0] == 1
-    if single:
-        values = np.mean(values, axis=0, keepdims=True)
+    moved = drift(time, device)
+    if reading.values.shape[0] == 1:
+        moved = Drift(*(np.mean(part, axis=0, keepdims=True) for part in moved))
+    scale = 1.0 + moved.gain
+    rates, _, gains = device.reshape(-1, DRIFT_SIZE).T
 
     def in_device() -> Array:
-        own = derivatives()
-        if single:
-            own = np.mean(own, axis=0, keepdims=True)
-        return np.concatenate([reading.in_device, own], axis=2)
+        nodes, width = reading.values.shape
+        own = np.zeros((nodes, width, device.size))
+        for axis in range(width):
+            first = DRIFT_SIZE * axis
+            own[:, axis, first] = moved.shape[:, axis]
+            own[:, axis, first + DRIFT_GAIN] = moved.shape[:, axis] * reading.values[:, axis]
+            rate = rates[axis] + gains[axis] * reading.values[:, axis]
+            own[:, axis, first + 1] = rate * moved.bend[:, axis]
+        return np.concatenate([reading.in_device * scale[:, :, None], own], axis=2)
 
-    return Reading(reading.values + values, reading.in_raw, in_device)
+    in_raw = reading.in_raw * scale[:, :, None] if np.any(gains) else reading.in_raw
+    return Reading(reading.values * scale + moved.zero, in_raw, in_device)
 
 
 #: load_cell: gain error 1, zero N, curve 1/N, hysteresis N, play N; then the share of each cable's tension

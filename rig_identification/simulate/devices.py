@@ -70,7 +70,7 @@ def watch_run(
         nodes = true.shown(
             device, flight.grid.step, mounts.read(device, motion.outputs, motion.R_world_body, true.device)
         )
-        return at_instants(flight.grid, instant, nodes) + true.drifted(device, instant - watch.begin)
+        return true.drifted(device, instant - watch.begin, at_instants(flight.grid, instant, nodes))
 
     return _watch(spec, true, motion.R_world_body[0], sampled, watch, rng)
 
@@ -83,7 +83,7 @@ def watch_rest(
 
     def sampled(device: str, mounts: Mounts, instant: Array) -> Array:
         still = mounts.read(device, rest.outputs, R[None], true.device)
-        return np.repeat(still, instant.size, axis=0) + true.drifted(device, instant - watch.begin)
+        return true.drifted(device, instant - watch.begin, np.repeat(still, instant.size, axis=0))
 
     return _watch(spec, true, R, sampled, watch, rng)
 

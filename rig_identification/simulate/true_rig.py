@@ -50,12 +50,12 @@ class TrueRig:
         """By how much the stamps of a device are late, s."""
         return float(self.device[self.parameters.places.clock(device)])
 
-    def drifted(self, device: str, time: Array) -> Array:
-        """(N, w) what a device's zeros have moved by, ``time`` (N,) s after a recording's start."""
+    def drifted(self, device: str, time: Array, values: Array) -> Array:
+        """(N, w) what a device reads of ``values`` (N, w), ``time`` (N,) s after a recording's start."""
         if device == "mocap":
-            return np.zeros((time.size, 1))
-        moved, _ = sensors.drift(time, self.device[self.parameters.places.drift(device)])
-        return moved
+            return values
+        moved = sensors.drift(time, self.device[self.parameters.places.drift(device)])
+        return values * (1.0 + moved.gain) + moved.zero
 
     def shown(self, device: str, step: float, values: Array) -> Array:
         """(N, w) what a device shows of its readings ``values`` (N, w), ``step`` s apart."""
