@@ -18,7 +18,7 @@ from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.launch import launch_state, launch_states
 from rig_identification.estimate.noise import FITTED_SAMPLES
 from rig_identification.estimate.pose_error import turning_of
-from rig_identification.estimate.prediction import linearise_run
+from rig_identification.estimate.prediction import Bench, linearise_run
 from rig_identification.estimate.sampling import sample_noise_std
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import CannotBeFollowed, Evaluation, Point, Problem, solve
@@ -106,7 +106,8 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
 
     The yardstick is the better half of the pieces. A piece at rest fits always and says nothing; what the
     model lacks, and what a tracker sees of a body far turned, grows with the swing and is no one's hand. Nor
-    is what noise leaves of a piece, however well others fit.
+    is what noise leaves of a piece, however well others fit. At either end of the stretch the instant is then
+    looked for within the piece (_driven_edge).
     """
     cut = pieces_of(run, long_enough(run, SHORT_PIECE, swings=1.0))
     errors = np.full(len(cut), np.inf)
@@ -116,23 +117,74 @@ def free_part(problem: Problem, run: Run, theta: Array, rest: State) -> FreePart
         if fitted is not None:
             errors[i] = float(np.sqrt(np.mean(fitted[0].residual ** 2)))
     shares = errors / swing
-    driven = (errors > DRIVEN * max(_calm(errors), 1.0)) & (shares > DRIVEN * _calm(shares))
+    calm, calm_share = max(_calm(errors), 1.0), _calm(shares)
+    driven = (errors > DRIVEN * calm) & (shares > DRIVEN * calm_share)
     best, begin = (0, 0), 0
     for i in range(len(cut) + 1):
         if i == len(cut) or driven[i]:
             if i - begin > best[1] - best[0]:
                 best = (begin, i)
             begin = i + 1
+    ordinary = np.maximum(calm, calm_share * swing)
     first, last = cut[best[0]], cut[best[1] - 1]
+    bench, usual = problem.bench, ordinary[[best[0], best[1] - 1]]
+    early = _driven_edge(bench, first, theta, rest, usual[0], at_end=False)
+    final = last.between(early, last.grid.nodes - 1) if last is first else last
+    late = _driven_edge(bench, final, theta, rest, usual[1], at_end=True)
     step = run.grid.step
-    a = round((first.offset - run.offset) / step)
-    b = round((last.offset - run.offset) / step) + last.grid.nodes - 1
-    held = tuple(
+    a = round((first.offset - run.offset) / step) + early
+    b = round((last.offset - run.offset) / step) + last.grid.nodes - 1 - late
+    start, end = run.offset + a * step, run.offset + b * step
+    held = [
         (piece.offset, piece.offset + piece.grid.duration)
         for piece, bad in zip(cut, driven, strict=True)
         if bad
-    )
-    return FreePart(run.between(a, b), first.offset, last.offset + last.grid.duration, held)
+    ]
+    held += [(first.offset, start)] if early else []
+    held += [(end, end + late * step)] if late else []
+    return FreePart(run.between(a, b), start, end, tuple(sorted(held)))
+
+
+#: Shares of a piece of which the first or the last may be driven while the piece as a whole hardly shows it.
+EDGES = (1 / 64, 1 / 48, 1 / 32, 3 / 64, 1 / 16, 3 / 32, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2)
+#: Numbers of a body's start: so many samples' worth may a fit gain that need not follow the driven ones.
+START_NUMBERS = 12.0
+
+
+def _driven_edge(
+    bench: Bench, piece: Run, theta: Array, rest: State, ordinary: float, *, at_end: bool
+) -> int:
+    """Nodes at the beginning, or the end, of a free stretch's outermost ``piece`` in which it is driven.
+
+    A hand lets go, or takes hold, within a tenth of a second: such a piece is driven for a part of it. The
+    fit of its start without that part then leaves less of the others, and of those left out more than DRIVEN
+    times what is ``ordinary`` (in units of noise). No sample counts for more than DRIVEN times that again: a
+    spike is no hand. 0: nothing is gained.
+    """
+    allowed = DRIVEN * ordinary
+    nodes = piece.grid.nodes - 1
+
+    def left(cut: int) -> tuple[float, int] | None:
+        rest_of_it = piece.between(0, nodes - cut) if at_end else piece.between(cut, nodes)
+        begun = launch_state(bench, rest_of_it, theta, rest)
+        fitted = fit_start(bench, rest_of_it, theta, begun)
+        if fitted is None:
+            return None
+        residual = fitted[0].residual
+        return float(np.sum(np.minimum(residual**2, (DRIVEN * allowed) ** 2))), residual.size
+
+    whole = left(0)
+    if whole is None:
+        return 0
+    best, most = 0, START_NUMBERS * allowed**2
+    for cut in dict.fromkeys(round(share * nodes) for share in EDGES):
+        without = left(cut) if cut else None
+        if without is None:
+            continue
+        gain = whole[0] - without[0] - allowed**2 * (whole[1] - without[1])
+        if gain > most:
+            best, most = cut, gain
+    return best
 
 
 def _calm(errors: Array) -> float:
