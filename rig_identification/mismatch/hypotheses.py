@@ -28,6 +28,9 @@ from rig_identification.mismatch.soft_mount import soft_mounts
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3
+#: Part of a body that moves otherwise on every rig: its cables, connectors, the air about it. Three times as
+#: much, a thousandth, moves the inertia by less than the tolerances of a rig do, and is no finding.
+LIGHT = 1.0 / 3000.0
 
 
 def catalogue(problem: Problem) -> list[Candidate]:
@@ -48,9 +51,18 @@ def catalogue(problem: Problem) -> list[Candidate]:
         *soft_mounts(parameters, {c.quantity for run in problem.runs for c in run.channels}),
         *left_out_physics(rig, parameters, mass),
     ]
+    every = [_as_on_every_rig(c, mass) for c in every]
     # What is slow has several descriptions and one place
     places = Counter(c.kind for c in every if not c.slow)
     return [c if c.slow else replace(c, places=places[c.kind]) for c in every]
+
+
+def _as_on_every_rig(candidate: Candidate, mass: float) -> Candidate:
+    """The same with how much of it every rig has, where it is a mass beside the body's ``mass`` (kg)."""
+    amount = candidate.parameters[0]
+    if candidate.ordinary or not candidate.positive or amount.unit != "kg":
+        return candidate
+    return replace(candidate, ordinary={amount.name: LIGHT * mass})
 
 
 def longest(problem: Problem) -> float:

@@ -59,12 +59,13 @@ class Asked(NamedTuple):
 def changes_of(fitted: Fitted, first: Rung) -> Asked:
     """Changes that may be what is wrong.
 
-    first: the model at its own level. Where that needs no wrench held-out runs are asked as well, and the
-    likeliest change has to add more to the log evidence than anything that is wrong all the time. What swings
-    or pulls, at any frequency or place, takes longest to ask, and comes last; not at all where the change has
-    the larger part of what is wrong. Beside a wrench, about a body that is bent to all of it, first order
-    ranks the same numbers over time; which ones they are a fit has to say. So a change that adds more than
-    the same numbers wrong all the time is worth one, though something else leads.
+    first: the model at its own level. Where that needs no wrench held-out runs are asked as well. The likeliest
+    change leads where it adds more to the log evidence than anything that is wrong all the time: what swings
+    all the time looks like a load that changes several times. What swings or pulls, at any frequency or place,
+    takes longest to ask, and comes last; not at all where the change has the larger part of what is wrong.
+    Beside a wrench, about a body that is bent to all of it, first order ranks the same numbers over time; which
+    ones they are a fit has to say. So a change that adds more than the same numbers wrong all the time is worth
+    one, though something else leads.
     """
     seen = _linearised(fitted, first)
     if seen is None:
@@ -80,14 +81,11 @@ def changes_of(fitted: Fitted, first: Rung) -> Asked:
     def likelier(promises: list[Promise]) -> bool:
         return changes[0].net > max((net_gain(p, count) for p in promises), default=0.0)
 
-    leading = likelier(always)
-    if not first.alone:
-        own = [p.gain for p in always if p.candidate is changes[0].group.of]
-        worth = changes[0].net > max(own, default=0.0) + MEANT
-        return Asked(changes if leading or worth else [], leading)
-    if leading and changes[0].net < (1.0 - OUTSIDE) * wrong(fitted):
-        leading = likelier(screen(problem, evaluation, candidates, mass))
-    return Asked(changes if leading else [], leading)
+    most = first.alone and changes[0].net > (1.0 - OUTSIDE) * wrong(fitted)
+    leading = likelier(always) and (most or likelier(screen(problem, evaluation, candidates, mass)))
+    own = [p.gain for p in always if p.candidate is changes[0].group.of]
+    worth = not first.alone and changes[0].net > max(own, default=0.0) + MEANT
+    return Asked(changes if leading or worth else [], leading)
 
 
 def _linearised(fitted: Fitted, first: Rung) -> tuple[Problem, Evaluation] | None:
