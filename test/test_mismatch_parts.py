@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.places import crossed, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.rider_places import travel_along
-from rig_identification.mismatch.riders import DAMPING, FREQUENCIES
+from rig_identification.mismatch.riders import DAMPING, FREQUENCIES, Swing, rider_candidate
 from rig_identification.mismatch.supports import (
     cable_elasticity,
     ceiling_candidate,
@@ -151,6 +153,29 @@ def test_a_massless_rider_travels_as_its_equation_says() -> None:
         assert np.max(np.abs(q[:, 0] - expected)[late]) < 1e-3 * abs(answer)
         assert np.max(np.abs(push[:, 0] - omega**2 * expected)[late]) < 2e-2 * omega**2 * abs(answer)
         assert np.max(np.abs(q[:, 1:])) == 0.0
+
+
+def test_a_part_that_turns_adds_its_inertia_to_the_model() -> None:
+    sample = thesis_case_14()
+    model = with_rest(sample.model())
+    bench = SimpleNamespace(rig=sample.rig, parameters=SimpleNamespace(model=model))
+    swing = Swing("z", 2.0, turning=(("x", 2.5), ("z", 3.0)))
+    problem: Any = SimpleNamespace(bench=bench)
+    candidate, values = rider_candidate(problem, swing, 1200.0, 30.0, np.array([0.1, 0.2, -0.5]))
+    built, parameters = candidate.built(model.with_internal(np.zeros((1, layout.INTERNAL_SIZE))))
+    assert built.internal == 4
+    blocks = built.physics[place.internal_block(4, 1) :].reshape(3, -1)
+    assert blocks[:, layout.KIND].tolist() == [layout.RIDER, layout.TURNING, layout.TURNING]
+    assert np.all(blocks[:, layout.LEADER] == 1)
+    assert np.array_equal(blocks[:, layout.AXIS : layout.AXIS + 3], np.eye(3)[[2, 0, 2]])
+    assert blocks[1:, layout.FREQUENCY].tolist() == [2.5, 3.0]
+    own = {p.name.removeprefix("sprung_mass."): p.index for p in parameters}
+    of_x, of_z = (place.internal_block(4, k) + layout.INERTIA for k in (2, 3))
+    # Of the tensor's columns those on and above the diagonal: its product stands in the later one
+    assert (own["inertia.x"], own["inertia.z"], own["inertia.xz"]) == (of_x, of_z + 2, of_z)
+    assert built.physics[own["inertia.x"]] == next(p.nominal for p in parameters if p.index == of_x) > 0.0
+    assert values["sprung_mass.mass"] == 30.0
+    assert "turns about x, z" in candidate.sentence
 
 
 def test_products_of_what_is_linear_in_a_place_are_those_at_every_place() -> None:

@@ -88,6 +88,7 @@ def searched(
     monkeypatch.setattr(queue, "crossed", crossed)
     monkeypatch.setattr(queue, "in_whole_runs", in_whole_runs)
     monkeypatch.setattr(queue, "stretch_of", lambda rung: rung)
+    monkeypatch.setattr(queue, "described_closer", lambda *_: [])
     monkeypatch.setattr(queue, "problem_of", lambda ideal: None)
     monkeypatch.setattr(queue, "catalogue", lambda problem: [_candidate("a")])
     first = _Rung(0.0, 0)
@@ -280,7 +281,9 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(expand, "contradicted", lambda trial: trial.candidate.effect == "clock")
     monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, level))
     monkeypatch.setattr(expand, "_closer", lambda *_: [])
+    monkeypatch.setattr(expand, "leaves_noise", lambda rung: False)
     monkeypatch.setattr(expand, "_giving_way", lambda *_: [])
+    monkeypatch.setattr(expand, "_stretching", lambda *_: [])
     monkeypatch.setattr(expand, "_clocks_and_lags", lambda ranked: ranked)
     monkeypatch.setattr(expand, "_last_of", lambda child: SimpleNamespace(candidate=child.found[-1]))
     monkeypatch.setattr(expand, "makes_sense", lambda standing, ordinary: True)
@@ -296,3 +299,34 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
         promises,
     )
     assert [child.label for child in found] == ["lag"]
+
+
+@pytest.mark.parametrize(
+    ("gain", "leaves", "beside", "led"),
+    [(120.0, 5, 130.0, True), (80.0, 5, 130.0, False), (120.0, 8, 130.0, False), (120.0, 5, 70.0, False)],
+)
+def test_what_else_is_there_is_asked_beside_cables_that_stretch(
+    monkeypatch: pytest.MonkeyPatch, gain: float, leaves: int, beside: float, led: bool
+) -> None:
+    """Where they gain what anything promises, and more is promised beside them; not where nothing is left."""
+
+    def down(model: object, point: object, level: int) -> object:
+        return replace(_model("cables", gain, leaves).rung)
+
+    monkeypatch.setattr(expand, "walked_down", down)
+    monkeypatch.setattr(expand, "_closer", lambda *_: [])
+    monkeypatch.setattr(expand, "makes_sense", lambda standing, problem: True)
+    about = [promise("mass", beside)]
+    monkeypatch.setattr(expand, "_screened", lambda *_: about)
+    taut = _model("cables", gain, 4)
+    found = expand._led_by(
+        None,  # type: ignore[arg-type]
+        _model("", 0.0, 4),
+        [taut],
+        [promise("mass", 100.0)],
+        [],
+        UNLIMITED,
+        lambda label: None,
+    )
+    assert [child.label for child in found] == (["cables"] if led else [])
+    assert [child.promises for child in found] == ([tuple(about)] if led else [])

@@ -8,17 +8,19 @@ tells its frequency to less than a percent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Problem
+from rig_identification.estimate.verdict import FALSE_ALARM
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.places import TERMS, Best, best_place, lines, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
@@ -26,6 +28,8 @@ from rig_identification.mismatch.riders import (
     DAMPING,
     DIRECTIONS,
     FREQUENCIES,
+    GYRATION,
+    TURNING_NUMBERS,
     Swing,
     filters,
     middle_of,
@@ -52,9 +56,17 @@ class Ridden:
 
     swing: Swing
     damping: float  # ratio
-    best: Best  # kg, at a place in units of ``spread_of`` from the middle
+    best: (
+        Best  # kg, at a place in units of ``spread_of`` from the middle; kg m^2 about each axis that it turns
+    )
     columns: Columns
-    runs: list[Array]  # (m, TERMS) its columns in every run
+    runs: list[Array]  # (m, TERMS + turning) its columns in every run
+
+    @property
+    def weights(self) -> Array:
+        """(TERMS + turning,) of the columns."""
+        amounts = self.best.amounts
+        return np.concatenate([amounts[0] * monomials(self.best.place), amounts[1:]])
 
 
 def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
@@ -118,11 +130,71 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
     return best
 
 
-def other_ways(problem: Problem, beyond: Beyond, known: str, amount: float, at: Array) -> dict[str, float]:
-    """Hz, by axis, with which a part that moves along ``known`` moves along others, where that explains some.
+def turning_too(problem: Problem, beyond: Beyond, ridden: Ridden, mass: float) -> Ridden | None:
+    """A part on springs that turns on them as well, at the place that explains most then.
 
-    amount: kg, at the place ``at`` (3,) m: both as fitted along the axis that is known. Of an axis along
-    which it is fixed no frequency explains anything.
+    A part that is no point and is taken for one is put where its arm does what its turning does, metres off.
+    One axis after the other, from the one that explains most; None where none explains any more. mass: kg, of
+    the body.
+    """
+    own = ridden.runs or columns_of(problem, beyond, ridden)
+    wrenches = _turning_wrenches(problem, beyond.full, SPARSE, ridden.damping)
+    rows = [
+        np.hstack([mine, whitened_response(run, wrenches[i], smooth=True)])
+        for i, (run, mine) in enumerate(zip(beyond.full.runs, own, strict=True))
+    ]
+    every = beyond.of(rows)
+    information = every.information(rows)
+    reach = GYRATION * float(np.max(extent(problem.bench.rig)))
+    precision = np.array([1.0, *[reach**-4] * len(AXES)]) / (0.05 * mass) ** 2
+    needed = 0.5 * float(chi2.isf(FALSE_ALARM / (len(AXES) * len(SPARSE)), TURNING_NUMBERS))
+
+    def of(turning: list[int]) -> Best | None:
+        matrix = np.zeros((1 + len(turning), TERMS, 1 + len(turning), TERMS))
+        right = np.zeros((1 + len(turning), TERMS))
+        chosen = [np.arange(TERMS), *(np.array([TERMS + k]) for k in turning)]
+        for i, a in enumerate(chosen):
+            right[i, : a.size] = every.right[a]
+            for j, b in enumerate(chosen):
+                matrix[i, : a.size, j, : b.size] = information[np.ix_(a, b)]
+        count = 1 + len(turning)
+        return best_place(matrix, right, precision[:count], count, 1.0, REACH)
+
+    best = ridden.best
+    chosen: list[int] = []
+    for _ in AXES:
+        left = [k for k in range(len(AXES) * len(SPARSE)) if k // len(SPARSE) not in _axes_of(chosen)]
+        tried = [(found.gain, k) for k in left if (found := of([*chosen, k])) is not None]
+        if not tried or max(tried)[0] - best.gain < needed:
+            break
+        chosen.append(max(tried)[1])
+        best = of(chosen) or best
+    if not chosen or not np.all(best.amounts > 0.0):
+        return None
+    order = np.argsort(chosen)
+    columns = np.concatenate([np.arange(TERMS), TERMS + np.array(chosen)[order]])
+    turning = tuple((AXES[k // len(SPARSE)], SPARSE[k % len(SPARSE)]) for k in sorted(chosen))
+    return replace(
+        ridden,
+        swing=replace(ridden.swing, turning=turning),
+        best=replace(best, amounts=np.concatenate([best.amounts[:1], best.amounts[1:][order]])),
+        columns=Columns(every.seen[:, columns], every.solved[:, columns], every.right[columns]),
+        runs=[row[:, columns] for row in rows],
+    )
+
+
+def _axes_of(turning: list[int]) -> set[int]:
+    """Axes of columns of :func:`turning_too`."""
+    return {k // len(SPARSE) for k in turning}
+
+
+def other_ways(
+    problem: Problem, beyond: Beyond, known: str, amount: float, at: Array
+) -> dict[str, tuple[float, float]]:
+    """Hz with which a part that moves along ``known`` moves along others as well, and nats that explains.
+
+    amount: kg, at the place ``at`` (3,) m: both as fitted along the axis that is known. By axis; of an axis
+    along which it is fixed no frequency explains anything.
     """
     u = (at - middle_of(problem.bench.rig)) / spread_of(problem)
     weights = amount * monomials(u)
@@ -136,9 +208,55 @@ def other_ways(problem: Problem, beyond: Beyond, known: str, amount: float, at: 
             columns, own = _one_of(found, responses, k)
             information = columns.information(own)
             gains[k] = columns.right @ weights - 0.5 * weights @ information @ weights
-        if np.max(gains) > 0.0:
-            out[axis] = FREQUENCIES[int(np.argmax(gains))]
+        best = int(np.argmax(gains))
+        if gains[best] > 0.0:
+            out[axis] = FREQUENCIES[best], float(gains[best])
     return out
+
+
+@dataclass(frozen=True)
+class Turned:
+    """How a part that moves on springs turns on them as well, and what that explains."""
+
+    gain: float  # nats
+    frequency: dict[str, float]  # Hz, by axis, in the order of AXES
+    inertia: dict[str, float]  # kg m^2 about its own centre, by axis
+
+
+def turning_ways(problem: Problem, beyond: Beyond, damping: float, known: str) -> Turned:
+    """About which axes but those ``known`` a part turns, and how fast, as far as each explains some.
+
+    One axis after the other, from the one that explains most by itself. damping: ratio.
+    """
+    each = len(FREQUENCIES)
+    needed = 0.5 * float(chi2.isf(FALSE_ALARM / (len(AXES) * each), TURNING_NUMBERS))
+    wrenches = _turning_wrenches(problem, beyond.full, FREQUENCIES, damping)
+    responses = [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(beyond.full.runs)]
+    found = beyond.of(responses)
+    information, right = found.information(responses), found.right
+
+    def of(columns: list[int]) -> tuple[float, Array]:
+        amounts: Array = np.asarray(np.linalg.solve(information[np.ix_(columns, columns)], right[columns]))
+        return (0.5 * float(amounts @ right[columns]) if np.all(amounts > 0.0) else 0.0), amounts
+
+    chosen: list[int] = []
+    gain, amounts = 0.0, np.zeros(0)
+    for _ in AXES:
+        taken = {AXES.index(a) for a in known} | {c // each for c in chosen}
+        left = [k for k in range(len(AXES) * each) if k // each not in taken]
+        if not left:
+            break
+        more, best = max((of([*chosen, k])[0], k) for k in left)
+        if more - gain < needed:
+            break
+        chosen.append(best)
+        gain, amounts = of(chosen)
+    ways = sorted(zip(chosen, amounts, strict=True))
+    return Turned(
+        gain,
+        {AXES[k // each]: FREQUENCIES[k % each] for k, _ in ways},
+        {AXES[k // each]: float(amount) for k, amount in ways},
+    )
 
 
 def _one_of(found: Columns, responses: list[Array], k: int) -> tuple[Columns, list[Array]]:
@@ -226,12 +344,8 @@ def _wrenches(
     first = layout.effects_offset(model.cables) + place.REFERENCE_ROTATION
     down = model.physics[first : first + 9].reshape(3, 3).T @ model.physics[:3]
     at = lines(1, middle_of(problem.bench.rig), spread_of(problem))[0]
-    out: dict[int, Array] = {}
-    for which in pieces_of(problem).values():
-        raw = np.concatenate(
-            [evaluation.runs[i].motion.outputs[: None if i == which[-1] else -1] for i in which]
-        )
-        step = problem.runs[which[0]].grid.step
+
+    def of(raw: Array, step: float) -> Array:
         felt = _felt(raw, at)
         tilted = raw[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3] - down
         wrench = np.zeros((raw.shape[0], 6, TERMS * len(kinds)))
@@ -239,6 +353,39 @@ def _wrenches(
             mine = wrench[:, :, TERMS * k : TERMS * (k + 1)]
             for axis in DIRECTIONS[directions]:
                 _swing_along(mine, AXES.index(axis), felt, down, tilted, at, frequency, damping, step)
+        return wrench
+
+    return _of_runs(problem, evaluation, of)
+
+
+def _turning_wrenches(
+    problem: Problem, evaluation: Evaluation, frequencies: Sequence[float], damping: float
+) -> dict[int, Array]:
+    """(N, 6, 3 F) wrench per kg m^2 turning about each axis at each of F frequencies (Hz), for each run."""
+
+    def of(raw: Array, step: float) -> Array:
+        wrench = np.zeros((raw.shape[0], 6, len(AXES) * len(frequencies)))
+        for k, (i, frequency) in enumerate(product(range(len(AXES)), frequencies)):
+            alpha = raw[:, layout.OUT_ANGULAR_ACCELERATION + i, None]
+            wrench[:, 3 + i, k] = travel_along(alpha, 0.0, frequency, damping, step)[1][:, 0]
+        return wrench
+
+    return _of_runs(problem, evaluation, of)
+
+
+def _of_runs(
+    problem: Problem, evaluation: Evaluation, of: Callable[[Array, float], Array]
+) -> dict[int, Array]:
+    """Wrenches (N, 6, C) of each run of the problem, as ``of`` tells them of a recording's whole motion.
+
+    of: of raw outputs (N, o), ``step`` s apart.
+    """
+    out: dict[int, Array] = {}
+    for which in pieces_of(problem).values():
+        raw = np.concatenate(
+            [evaluation.runs[i].motion.outputs[: None if i == which[-1] else -1] for i in which]
+        )
+        wrench = of(raw, problem.runs[which[0]].grid.step)
         start = 0
         for i in which:
             nodes = problem.runs[i].grid.nodes
@@ -261,14 +408,14 @@ def _felt(raw: Array, at: Array) -> Array:
 def travel_along(
     force: Array, tilted: float, frequency: float, damping: float, step: float
 ) -> tuple[Array, Array]:
-    """Travel q (N, 4) and less its acceleration (N, 4) of a massless rider, by place.
+    """Travel q (N, c) and less its acceleration (N, c) of a massless rider, by place.
 
-    force (N, 4): specific force along the rider's axis plus gravity of the rest pose. tilted: gravity at the
+    force (N, c): specific force along the rider's axis plus gravity of the rest pose. tilted: gravity at the
     first node less that of the rest pose, along the axis: before that node the rider hangs in it.
     """
     omega = 2.0 * np.pi * frequency
     numerator, denominator = filters(frequency, step, damping)
-    away, before = force.copy(), np.zeros(4)
+    away, before = force.copy(), np.zeros(force.shape[1])
     # Displaced by its weight before the start: the deviation from there starts from zero
     away[:, 0] += tilted
     before[0] = tilted / omega**2

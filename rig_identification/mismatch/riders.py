@@ -5,7 +5,10 @@ passenger's travel follows from the fitted motion alone, and the wrench by which
 would differ from a kilogram fixed to the body is linear in its mass m and in m times its place.
     q'' + 2 zeta w q' + w^2 q = -d . (f_a + g_rest),   f_a: specific force at the place
     F = -m d q'',   M = m a x (-d q'') - m (d q) x f
-(effects/internal.py, for small q and slow turning.)
+(effects/internal.py, for small q and slow turning.) A part that is no point turns on its springs as well: of
+its own inertia I about a body axis e
+    theta'' + 2 zeta w theta' + w^2 theta = -e . alpha,   M = -I e theta''
+(effects/turning.py, to first order), linear in I.
 """
 
 from __future__ import annotations
@@ -46,6 +49,7 @@ class Swing:
     directions: str  # key of DIRECTIONS, or "xyz" where each axis has its own frequency
     frequency: float  # Hz, the lowest
     along: tuple[float, ...] = ()  # Hz, of each axis where they differ
+    turning: tuple[tuple[str, float], ...] = ()  # axes that it turns about as well, and Hz about each
 
     @property
     def effect(self) -> str:
@@ -55,8 +59,14 @@ class Swing:
 
 #: Swings that are tried; neighbours tell much the same, and count once.
 SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES[::2])
-#: Numbers of a rider: mass, place, frequency, damping.
-NUMBERS = 6
+#: Numbers of a rider: mass, place, frequency, damping; of each axis that it turns about: inertia, frequency.
+NUMBERS, TURNING_NUMBERS = 6, 2
+#: Std of a rider's mass in parts of the body's.
+MASS_STD = 0.05
+#: Radius of gyration of a part in parts of the longest distance between two hinges, as that of a body in
+#: search/levels.py; std of its inertia's logarithm: three of them reach from a motor to all of a car but its
+#: frame; and of a product of inertia in parts of the usual moment.
+GYRATION, INERTIA_STD, PRODUCT_STD = 0.3, 1.5, 1.0
 
 
 def middle_of(rig: Rig) -> Array:
@@ -100,6 +110,40 @@ def _ringing_like(
     return sinking, (stretching, {STIFFNESS: yielding_like(rig, model, compliance)})
 
 
+def _turning(
+    effect: str, swing: Swing, mass: float, size: float, first: int
+) -> tuple[Array, tuple[Parameter, ...]]:
+    """Blocks of the axes that a rider turns about, behind those of its directions, and their parameters.
+
+    mass: kg, size: m, of the body. first: entry of the rider's first block.
+    """
+    turning = [(AXES.index(a), f) for a, f in swing.turning]
+    blocks, parameters = np.zeros((len(turning), layout.INTERNAL_SIZE)), []
+    usual = MASS_STD * mass * (GYRATION * size) ** 2
+    for row, (i, frequency) in enumerate(turning):
+        block, a = blocks[row], AXES[i]
+        block[layout.KIND], block[layout.AXIS + i] = layout.TURNING, 1.0
+        block[layout.INERTIA + i], block[layout.FREQUENCY] = usual, frequency
+        block[layout.DAMPING_RATIO] = DAMPING
+        o = first + layout.INTERNAL_SIZE * (len(swing.directions) + row)
+        numbers = [
+            (f"inertia.{a}", "kg m^2", usual, INERTIA_STD, layout.INERTIA + i, True),
+            (f"turning_frequency.{a}", "Hz", frequency, 0.3, layout.FREQUENCY, True),
+            (f"turning_damping_ratio.{a}", "1", DAMPING, 1.0, layout.DAMPING_RATIO, True),
+        ]
+        numbers += [
+            (f"inertia.{AXES[k]}{a}", "kg m^2", 0.0, PRODUCT_STD * usual, layout.INERTIA + k, False)
+            for k, _ in turning[:row]
+        ]
+        parameters += [
+            Parameter(
+                f"{effect}.{name}", unit, nominal, std, "physics", o + entry, bounded=False, ratio=ratio
+            )
+            for name, unit, nominal, std, entry, ratio in numbers
+        ]
+    return blocks, tuple(parameters)
+
+
 def rider_candidate(
     problem: Problem, swing: Swing, mass: float, found: float, at: Array
 ) -> tuple[Candidate, dict[str, float]]:
@@ -117,6 +161,9 @@ def rider_candidate(
         frequencies = {f"frequency.{a}": f for a, f in zip(axes, swing.along, strict=True)}
 
     def build(model: RigModel) -> tuple[RigModel, tuple[Parameter, ...]]:
+        turns, its_own = _turning(
+            effect, swing, mass, size, place.internal_block(model.cables, model.internal)
+        )
         blocks = np.zeros((len(axes), layout.INTERNAL_SIZE))
         for row, axis in enumerate(axes):
             blocks[row, layout.AXIS + AXES.index(axis)] = 1.0
@@ -132,7 +179,7 @@ def rider_candidate(
             )
 
         parameters = (
-            number("mass", "kg", 0.0, 0.05 * mass, layout.MASS, False),
+            number("mass", "kg", 0.0, MASS_STD * mass, layout.MASS, False),
             *(
                 number(f"position.{a}", "m", float(middle[i]), 0.5 * size, layout.POINT + i, False)
                 for i, a in enumerate(AXES)
@@ -143,7 +190,7 @@ def rider_candidate(
             ),
             number("damping_ratio", "1", DAMPING, 1.0, layout.DAMPING_RATIO, True),
         )
-        return model.with_internal(blocks), parameters
+        return model.with_internal(np.concatenate([blocks, turns])), parameters + its_own
 
     def told(found: Estimates) -> Told:
         out: Told = {"mass": (*found.of(f"{effect}.mass"), "kg")}
@@ -151,15 +198,21 @@ def rider_candidate(
         if swing.along:
             out["frequency"] = min(swings.values())
         out |= swings | {"damping_ratio": (*found.of(f"{effect}.damping_ratio"), "1")}
+        for a, _ in swing.turning:
+            out[f"inertia_{a}"] = (*found.of(f"{effect}.inertia.{a}"), "kg m^2")
+            out[f"turning_frequency_{a}"] = (*found.of(f"{effect}.turning_frequency.{a}"), "Hz")
         return out | {f"position_{a}": (*found.of(f"{effect}.position.{a}"), "m") for a in AXES}
 
+    ways = ", ".join(axes)
+    if swing.turning:
+        ways += f" and turns about {', '.join(a for a, _ in swing.turning)}"
     thing, advice = {
         "liquid_slosh": (
             "A liquid swings in a tank:",
             "Fill the tank to the brim or empty it.",
         ),
         "sprung_mass": (
-            f"A part moves on springs along {', '.join(axes)}:",
+            f"A part moves on springs along {ways}:",
             "Block the springs or take the part off.",
         ),
     }[effect]
@@ -172,7 +225,7 @@ def rider_candidate(
         positive=1,
         tell=told,
         build=build,
-        twins=() if len(axes) > 1 else _ringing_like(problem, swing, mass),
+        twins=() if len(axes) > 1 or swing.turning else _ringing_like(problem, swing, mass),
     )
     values = {f"{effect}.mass": found}
     values |= {f"{effect}.position.{a}": float(at[i]) for i, a in enumerate(AXES)}

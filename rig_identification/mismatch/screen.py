@@ -34,6 +34,8 @@ from rig_identification.mismatch.rider_places import (
     other_ways,
     scanned,
     spread_of,
+    turning_too,
+    turning_ways,
 )
 from rig_identification.mismatch.riders import (
     NUMBERS,
@@ -62,6 +64,8 @@ COARSE = 0.5
 #: Share of the best promise down to which a scanned swing keeps its columns, which fill the memory: of
 #: another one they are computed again where it is asked for.
 KEPT = 0.5
+#: Share of what is promised that first order is right within.
+AS_MUCH = 0.5
 #: Share of the best promise of an effect that another one of the same has to come to, to be fitted as well.
 ELSEWHERE = 0.8
 
@@ -121,7 +125,8 @@ def screen(
     rig, model = problem.bench.rig, problem.bench.parameters.model
     axes = () if gives_way(model) else range(3)
     probes = [ceiling_candidate(rig, model, mass, a, probe=True) for a in axes]
-    taut = taut_cables(rig, model, mass)
+    # Beside a wrench they are begun whatever they promise (search/expand.py)
+    taut = taut_cables(rig, model, mass) if problem.discrepancy is None else []
     opened = opened_with(problem, evaluation, [*candidates, *probes, *taut])
     if opened is None:
         return []
@@ -239,12 +244,12 @@ def _riders(problem: Problem, beyond: Beyond, mass: float, count: int) -> list[P
             swings = found.setdefault((effect, ridden.swing.directions), [])
             most = max([ridden.best.gain, *(r.best.gain for r in swings)])
             swings.append(ridden if ridden.best.gain > KEPT * most else replace(ridden, runs=[]))
-    every = None
+    bodies = []
     if problem.discrepancy is not None and "sprung_mass.mass" not in taken:
-        every = on_springs_all_ways(problem, beyond, mass)
+        bodies = _bodies_on_springs(problem, beyond, mass, found)
     best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
-    all_ways = [] if every is None else [_ridden_promise(problem, beyond, every, mass)]
+    all_ways = [_ridden_promise(problem, beyond, every, mass) for every in bodies]
     # Only what may come to be the best of them, and beyond chance
     least = COARSE * max([least, *(peaks[0].gain for peaks in best)])
     return [
@@ -254,6 +259,21 @@ def _riders(problem: Problem, beyond: Beyond, mass: float, count: int) -> list[P
         ),
         *all_ways,
     ]
+
+
+def _bodies_on_springs(
+    problem: Problem, beyond: Beyond, mass: float, found: dict[tuple[str, str], list[Ridden]]
+) -> list[Ridden]:
+    """A part that moves along all axes, and parts that turn beside moving along all or along one of them.
+
+    found: swings along each direction that were scanned. mass: kg, of the body.
+    """
+    along = [r for (effect, _), swings in found.items() if effect == "sprung_mass" for r in swings]
+    every = on_springs_all_ways(problem, beyond, mass)
+    parts = [every] if every is not None else []
+    parts += [max(along, key=lambda r: r.best.gain)] if along else []
+    turning = [turning_too(problem, beyond, part, mass) for part in parts]
+    return [*parts[: every is not None], *(t for t in turning if t is not None)]
 
 
 def _best_swings(problem: Problem, beyond: Beyond, swings: list[Ridden], mass: float) -> list[Promise]:
@@ -316,36 +336,61 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
     best, gain = found.best, found.best.gain
     if misfit(beyond.full) < NEAR_SQUARE:
         runs = found.runs or columns_of(problem, beyond, found)
-        gain -= _unearned(problem, beyond, found.columns, best.weights, runs)
+        gain -= _unearned(problem, beyond, found.columns, found.weights, runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
-    if len(found.swing.directions) == 1:
-        candidate = replace(candidate, between=partial(_all_ways, found.swing, mass))
+    if found.swing.effect == "sprung_mass":
+        candidate = replace(candidate, between=partial(_more_ways, found.swing, mass))
+    for (a, _), inertia in zip(found.swing.turning, best.amounts[1:], strict=True):
+        values[f"{found.swing.effect}.inertia.{a}"] = float(inertia)
+        values[f"{found.swing.effect}.turning_damping_ratio.{a}"] = found.damping
     return Promise(candidate, gain, values | {f"{found.swing.effect}.damping_ratio": found.damping})
 
 
-def _all_ways(
+def _more_ways(
     swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
 ) -> list[tuple[Candidate, dict[str, float]]]:
-    """A part that was fitted along one axis or two, moving along others too. mass: kg, of the body."""
-    opened = opened_with(problem, evaluation, [])
-    if opened is None:
-        return []
+    """A fitted part on springs, moving along further axes, or turning; what promises more comes first.
+
+    mass: kg, of the body. One that promises less than a half of the other is not asked before the other.
+    """
     effect, known = swing.effect, swing.directions
     values = problem.bench.parameters.named(evaluation.point.theta)
+    opened = opened_with(problem, evaluation, []) if values[f"{effect}.mass"] > 0.0 else None
+    if opened is None:
+        return []
     amount, at = values[f"{effect}.mass"], np.array([values[f"{effect}.position.{a}"] for a in AXES])
     have = {a: values[f"{effect}.frequency.{a}" if swing.along else f"{effect}.frequency"] for a in known}
-    ways = other_ways(problem, opened[1], known, amount, at) | have
-    if len(ways) == len(known):
-        return []
-    axes = "".join(a for a in AXES if a in ways)
-    along = tuple(ways[a] for a in axes)
-    moving = Swing(axes, min(along), along)
-    candidate, start = rider_candidate(problem, moving, mass, amount, at)
-    if len(axes) < len(AXES):
-        candidate = replace(candidate, between=partial(_all_ways, moving, mass))
-    start |= {f"{effect}.frequency.{a}": f for a, f in ways.items()}
-    return [(candidate, start | {f"{effect}.damping_ratio": values[f"{effect}.damping_ratio"]})]
+    turning = {a: values[f"{effect}.turning_frequency.{a}"] for a, _ in swing.turning}
+    damping = values[f"{effect}.damping_ratio"]
+    asked: list[tuple[float, Swing, dict[str, float]]] = []
+    ways = other_ways(problem, opened[1], known, amount, at)
+    if ways:
+        frequencies = {a: ways[a][0] if a in ways else have[a] for a in AXES if a in ways or a in have}
+        along = tuple(frequencies.values())
+        moving = Swing("".join(frequencies), min(along), along, tuple(turning.items()))
+        asked.append((sum(gain for _, gain in ways.values()), moving, {}))
+    turned = turning_ways(problem, opened[1], damping, "".join(turning))
+    if turned.inertia:
+        about = turning | turned.frequency
+        moving = replace(swing, turning=tuple((a, about[a]) for a in AXES if a in about))
+        moving = replace(
+            moving, **({"along": tuple(have.values())} if swing.along else {"frequency": have[known]})
+        )
+        inertias = {f"{effect}.inertia.{a}": inertia for a, inertia in turned.inertia.items()}
+        dampings = {f"{effect}.turning_damping_ratio.{a}": damping for a in turned.inertia}
+        asked.append((turned.gain, moving, inertias | dampings))
+    most = max((gain for gain, _, _ in asked), default=0.0)
+    kept = {q.name: values[q.name] for q in problem.bench.parameters.free if q.name.startswith(f"{effect}.")}
+    out = []
+    for gain, moving, own in sorted(asked, key=lambda a: -a[0]):
+        if gain >= AS_MUCH * most:
+            candidate, start = rider_candidate(problem, moving, mass, amount, at)
+            candidate = replace(candidate, between=partial(_more_ways, moving, mass))
+            names = {q.name for q in candidate.parameters}
+            start |= {name: value for name, value in kept.items() if name in names}
+            out.append((candidate, start | own))
+    return out
 
 
 def _unearned(problem: Problem, beyond: Beyond, columns: Columns, amounts: Array, runs: list[Array]) -> float:

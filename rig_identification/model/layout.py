@@ -26,11 +26,12 @@ HINGE_DAMPING = 13  # N m s/rad, of its own two hinges beside what all have (eff
 HINGE_FRICTION = 14  # N m, of its own two hinges beside what all have (effects/hinge_friction.py)
 
 # One internal coordinate (effects/internal.py); its block follows the effects' block
-KIND = 0  # constant: RIDER or CEILING
+KIND = 0  # constant: RIDER, CEILING or TURNING
 LEADER = 1  # constant: number of the coordinate that holds what those of one mass share
 AXIS = 2  # 3: direction, in body (rider) or world (ceiling)
 MASS = 5  # kg (rider)
 POINT = 6  # 3: m, body: where a rider rests
+INERTIA = 6  # 3: kg m^2 (turning), of a rider about its centre, x, y, z against AXIS (effects/turning.py)
 HINGE = 6  # constant (ceiling): 0 moves all upper hinges, i + 1 that of cable i alone
 FREQUENCY = 9  # Hz
 DAMPING_RATIO = 10
@@ -41,6 +42,7 @@ STOP_DAMPING = 14  # damping ratio of the stops: how much of a blow's energy the
 INTERNAL_SIZE = 15
 RIDER = 0.0
 CEILING = 1.0
+TURNING = 2.0
 
 # Local state of the body: see dynamics.py. Internal coordinates follow, then their rates
 POSITION = 0

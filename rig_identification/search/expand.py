@@ -27,6 +27,7 @@ from rig_identification.mismatch.trial import (
     Trial,
     attempt,
     beyond_doubt,
+    is_ordinary,
     mass_of,
     ordinary_errors,
     possible,
@@ -62,6 +63,7 @@ class Standing:
     rung: Rung
     found: tuple[Candidate, ...] = ()
     unearned: float = 0.0  # nats that it gains from the noise of the exciter's force alone (in_motion.py)
+    promises: tuple[Promise, ...] | None = None  # about it, where they are known
 
     @property
     def evidence(self) -> float:
@@ -94,13 +96,17 @@ def children(
     """
     rung = standing.rung
     left = compatible(candidates, list(standing.found))
+    if promises is None and standing.promises is not None:
+        promises = list(standing.promises)
     if promises is None:
-        say("screening")
-        promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
-        promises += promised_laws(rung, standing.found)
+        promises = _screened(rung, standing.found, left, say)
     promised_here = worthy(promises, count_of(candidates))
-    first = _first_fits(standing, promised_here, budget, say)
-    first += _giving_way(standing, first, budget, say)
+    taut = [] if rung.alone else _stretching(standing, budget, say)
+    led = _led_by(problem, standing, taut, promised_here, candidates, budget, say)
+    if led:
+        return led
+    first = _first_fits(standing, promised_here, budget, say) + taut
+    first += _giving_way(standing, first, budget, say) if rung.alone else []
     first += _alike(standing, first, left, budget, say)
     first = [child for child in first if not contradicted(_last_of(child))]
     first.sort(key=lambda child: -child.rung.within_reach)
@@ -119,11 +125,51 @@ def children(
         down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
         if down is not None:
             walked.append(replace(child, rung=down))
-            walked += _closer(problem, walked[-1], budget, say)
+            if not leaves_noise(down):
+                walked += _closer(problem, walked[-1], budget, say)
     if not any(w.rung.alone for w in walked):
         walked += _unbent(standing, left, promised_here, budget, say)
     sensible = (earned(standing, s) for s in walked if makes_sense(s, problem))
     return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
+
+
+def _screened(rung: Rung, found: tuple[Candidate, ...], left: list[Candidate], say: Say) -> list[Promise]:
+    """What the hypotheses ``left`` promise about a model with the effects ``found``."""
+    say("screening")
+    promises = screen(rung.problem, rung.evaluation, left, mass_of(rung.problem, rung.evaluation))
+    return promises + promised_laws(rung, found)
+
+
+def _led_by(
+    problem: Problem,
+    standing: Standing,
+    taut: list[Standing],
+    promises: list[Promise],
+    candidates: list[Candidate],
+    budget: Budget,
+    say: Say,
+) -> list[Standing]:
+    """Cables that stretch at their level, where they gain what anything else promises and leave something.
+
+    All cables stretch, and what else is there is there beside that. It is asked beside them: without them in
+    the model it bends to what they do to the tensions, and its fits cost several times theirs. Beside them it
+    promises more then than without them; where it promises less they stand in for it. Where they leave
+    nothing, or make no sense, they are one hypothesis of others. taut: their first fit.
+    """
+    most = max((p.gain for p in promises), default=np.inf)
+    if not taut or _gain(standing, taut[0]) < most:
+        return []
+    begun = taut[0].rung
+    down = walked_down(begun.model, begun.evaluation.point, begun.level)
+    if down is None or down.alone:
+        return []
+    led = replace(taut[0], rung=down)
+    beside = _screened(down, led.found, compatible(candidates, list(led.found)), say)
+    if max((p.gain for p in worthy(beside, count_of(candidates))), default=0.0) < most:
+        return []
+    led = replace(led, promises=tuple(beside))
+    every = [s for s in (led, *_closer(problem, led, budget, say)) if makes_sense(s, problem)]
+    return sorted(every, key=lambda s: -s.evidence)
 
 
 def _gain(standing: Standing, child: Standing) -> float:
@@ -208,19 +254,13 @@ def _first_fits(standing: Standing, promises: list[Promise], budget: Budget, say
 
 
 def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: Say) -> list[Standing]:
-    """First fits of what gives way, of which first order says nothing where it rings.
+    """First fits of what gives way beside no wrench, where first order says nothing of what rings.
 
-    Without a wrench in the model it is scanned by its amount, where the residuals as a whole show something
-    and nothing that was fitted takes the larger part away. With a wrench what rings is told by its forces.
-    But cables that stretch let the body move where no force could move it, and the rig's geometry and the
-    wrench bend to that: first order promised 92 nats of the 17,000 that they explain of a car on wires. So
-    they are begun, whatever is promised: as wire does, and as softer rope where the wrench does not account
-    for what is measured.
+    It is scanned by its amount, where the residuals as a whole show something and nothing that was fitted
+    takes the larger part away.
     """
     rung = standing.rung
     before = rung.evaluation
-    if not rung.alone:
-        return _stretching(standing, misfit(before) > NEAR_SQUARE, budget, say)
     taken = any(excess(child.rung.evaluation) < CHIEF * excess(before) for child in first)
     if taken or not shows(before) or budget.spent():
         return []
@@ -229,14 +269,19 @@ def _giving_way(standing: Standing, first: list[Standing], budget: Budget, say: 
     return _first_fits(standing, worthy(promises, len(promises)), budget, say)
 
 
-def _stretching(standing: Standing, soft: bool, budget: Budget, say: Say) -> list[Standing]:
-    """The best first fit of cables that stretch, as wire does or, if ``soft``, as rope of any kind does."""
+def _stretching(standing: Standing, budget: Budget, say: Say) -> list[Standing]:
+    """The best first fit of cables that stretch: as wire, or as rope where the wrench leaves some of it.
+
+    With a wrench what rings is told by its forces. But cables that stretch let the body move where no force
+    could move it, and the rig's geometry and the wrench bend to that: first order promised 92 nats of the
+    17,000 that they explain of a car on wires. So they are begun, whatever is promised.
+    """
     rung = standing.rung
     rig, model = rung.problem.bench.rig, rung.problem.bench.parameters.model
     mass = mass_of(rung.problem, rung.evaluation)
     *ropes, wire = stiffnesses(rig, mass)
     starts = [Promise(c, 0.0, {TAUT: 1.0 / wire}) for c in taut_cables(rig, model, mass)]
-    if soft and not gives_way(model):
+    if misfit(rung.evaluation) > NEAR_SQUARE and not gives_way(model):
         elastic = cable_elasticity(rig, model, mass)
         starts += [Promise(elastic, 0.0, {STIFFNESS: amount}) for amount in ropes]
     found = [begun_with(standing, start, budget, say) for start in starts if not budget.spent()]
@@ -326,7 +371,7 @@ def _with_twins(promises: list[Promise], found: tuple[Candidate, ...]) -> Iterat
 
 
 def worthy(promises: list[Promise], count: int) -> list[Promise]:
-    """The promises worth a fit: of each kind the best ones, as many as are fitted."""
+    """The promises worth a fit: of each kind and size the best ones, as many as are fitted."""
     out: list[Promise] = []
     for promise in sorted(promises, key=lambda p: -net_gain(p, count)):
         if net_gain(promise, count) <= 0.0 or len(out) == FITTED:
@@ -335,9 +380,14 @@ def worthy(promises: list[Promise], count: int) -> list[Promise]:
             break
         if stood_for(promise, promises, count):
             continue
-        if sum(promise.candidate.kind == other.candidate.kind for other in out) < ALIKE:
+        if sum(_alike_in_size(promise.candidate, other.candidate) for other in out) < ALIKE:
             out.append(promise)
     return out
+
+
+def _alike_in_size(one: Candidate, other: Candidate) -> bool:
+    """Whether two are of one kind and size: a part that moves one way, or three, or turns besides, are not."""
+    return one.kind == other.kind and len(one.parameters) == len(other.parameters)
 
 
 def _entered(
@@ -350,6 +400,25 @@ def _entered(
     wide = extended(parent, (candidate,))
     there = promised(wide, carried(wide, rung.problem, point), candidate, values, rung.evaluation)
     return wide, beside(rung.problem, there, wide, rung.evaluation)
+
+
+def leaves_noise(rung: Rung) -> bool:
+    """Whether a model needs no wrench, and its residuals as a whole show nothing more."""
+    return rung.alone and not shows(rung.evaluation)
+
+
+def described_closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> list[Standing]:
+    """A model that leaves noise on its stretch, with likelier closer descriptions of its effects, best first.
+
+    They are asked where whole runs show that something is left. Of a model that leaves noise a closer
+    description gains next to nothing, and its fit costs as much as the first one's: 7 nats of 82,000 and half
+    of the work for the third axis that a car's wheels turn about. problem: without any effect.
+    """
+    if not leaves_noise(standing.rung):
+        # Those were asked on the way to its level
+        return []
+    every = [s for s in _closer(problem, standing, budget, say) if makes_sense(s, problem)]
+    return sorted((s for s in every if s.evidence > standing.evidence + MEANT), key=lambda s: -s.evidence)
 
 
 def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> Iterator[Standing]:
@@ -377,7 +446,7 @@ def _closer(problem: Problem, standing: Standing, budget: Budget, say: Say) -> I
             if down is not None:
                 nearer = Standing(down, (*others, closer))
                 yield nearer
-                if nearer.evidence > standing.evidence + MEANT:
+                if nearer.evidence > standing.evidence + MEANT and not leaves_noise(down):
                     yield from _closer(problem, nearer, budget, say)
 
 

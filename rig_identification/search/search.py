@@ -19,7 +19,7 @@ from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.crossed import crossed, siblings
-from rig_identification.search.expand import MEANT, Standing, children
+from rig_identification.search.expand import MEANT, Standing, children, described_closer
 from rig_identification.search.ladder import REACHED, Rung, begun, climbed
 from rig_identification.search.levels import ALONE
 from rig_identification.search.stretch import over_all, stretch_of
@@ -107,11 +107,12 @@ def search(
         def say(label: str, turn: int = turn) -> None:
             notify(f"search: {label}", (turn + 0.5) / (EXPANDED + 1))
 
-        every = children(looked_at, standing, candidates, budget, say, None if turn else promises)
+        nearer = described_closer(looked_at, standing, budget, say)
+        every = nearer or children(looked_at, standing, candidates, budget, say, None if turn else promises)
         every = [child for child in every if child.evidence > standing.evidence + MEANT]
         if not every:
             continue
-        if every[0].rung.level >= NEARLY_ALONE:
+        if every[0].rung.level >= NEARLY_ALONE and not nearer:
             rivals = siblings(standing, queue)
             every += crossed(looked_at, standing, every[0], rivals, budget, say)
             every.sort(key=lambda child: -child.evidence)

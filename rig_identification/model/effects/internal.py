@@ -19,6 +19,8 @@ springs, so that it rises along n = d_1 x d_2 by l - s, s = (l^2 - q^2)^1/2, as 
 t_k stands for d_k above (what damps it works along its path), g for g - g_rest, nothing for the
 spring, and the acceleration of rho gains n (q'.q'/s + (q.q')^2/s^3).
 
+A rider that is no point may turn on its springs as well: turning.py.
+
 A ceiling moves all upper hinges, or one alone, by d q. With compliance kappa = 1/k and f = (k/M)^(1/2)/2 pi
     q''/(2 pi f)^2 + 2 zeta q'/(2 pi f) + q = -kappa sum T_i u_i . d
 which is a ceiling that does not feel the cables where kappa is zero. The sum is over the cables whose hinges
@@ -34,6 +36,7 @@ from numba import njit
 from rig_identification.model.arithmetic import reciprocal, root
 from rig_identification.model.effects.place import EFFECTS_SIZE, REFERENCE_ROTATION, active
 from rig_identification.model.effects.point_mass import add_point_inertia
+from rig_identification.model.effects.turning import add_turning
 from rig_identification.model.layout import (
     AXIS,
     BODY_STATE,
@@ -52,6 +55,7 @@ from rig_identification.model.layout import (
     PENDULUM,
     POINT,
     RATE,
+    RIDER,
     STOP,
     STOP_DAMPING,
 )
@@ -166,7 +170,7 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
         qx, qy, qz = nx * curving, ny * curving, nz * curving
     for k in range(leader, count):
         o = first + INTERNAL_SIZE * k
-        if physics[o + KIND].real == CEILING or int(physics[o + LEADER].real) != leader:
+        if physics[o + KIND].real != RIDER or int(physics[o + LEADER].real) != leader:
             continue
         q, speed = x[BODY_STATE + k], x[BODY_STATE + count + k]
         px += physics[o + AXIS] * q
@@ -197,7 +201,7 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
         r[5] += mass * (dx * gy - dy * gx) + px * fy - py * fx
     for j in range(leader, count):
         o = first + INTERNAL_SIZE * j
-        if physics[o + KIND].real == CEILING or int(physics[o + LEADER].real) != leader:
+        if physics[o + KIND].real != RIDER or int(physics[o + LEADER].real) != leader:
             continue
         row = 6 + cables + j
         rise = x[BODY_STATE + j] * per_s
@@ -221,7 +225,7 @@ def _add_rider(physics, block, first, cables, leader, x, R, K, r):  # type: igno
         K[5, row] = mass * mz
         for k in range(leader, count):
             p = first + INTERNAL_SIZE * k
-            if physics[p + KIND].real != CEILING and int(physics[p + LEADER].real) == leader:
+            if physics[p + KIND].real == RIDER and int(physics[p + LEADER].real) == leader:
                 rise = x[BODY_STATE + k] * per_s
                 K[row, 6 + cables + k] = (
                     dx * (physics[p + AXIS] + nx * rise)
@@ -254,3 +258,4 @@ def add_internal(physics, block, modes, x, R, K, r):  # type: ignore[no-untyped-
             r[row] = -x[BODY_STATE + j] - 2.0 * physics[o + DAMPING_RATIO] / omega * speed
         elif int(physics[o + LEADER].real) == j:
             _add_rider(physics, block, first, cables, j, x, R, K, r)
+            add_turning(physics, first, cables, j, x, K, r)
