@@ -54,7 +54,7 @@ def _rates(recording: Recording, held: tuple[float, float] = (0.0, 0.0)) -> Reco
 
 
 def found(recording: Recording, guessed: float = 1.1) -> FreePart:
-    """The free part, looked for with a body of ``guessed`` times its inertia: as near as a first scan comes."""
+    """The free part, looked for with a body of ``guessed`` times its inertia: as a first scan has it."""
     problem, theta, _ = pose_problem(replace(swung(), recordings=(recording,)))
     body = BODY.copy()
     body[4:] *= guessed

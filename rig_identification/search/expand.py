@@ -27,7 +27,6 @@ from rig_identification.mismatch.trial import (
     Trial,
     attempt,
     beyond_doubt,
-    is_ordinary,
     mass_of,
     ordinary_errors,
     possible,
@@ -386,7 +385,7 @@ def worthy(promises: list[Promise], count: int) -> list[Promise]:
 
 
 def _alike_in_size(one: Candidate, other: Candidate) -> bool:
-    """Whether two are of one kind and size: a part that moves one way, or three, or turns besides, are not."""
+    """Whether two are of one kind and size, as a part that moves one way and one that turns are not."""
     return one.kind == other.kind and len(one.parameters) == len(other.parameters)
 
 
