@@ -10,15 +10,15 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, Scores, fit_session, judged
-from rig_identification.estimate.solve import solve
+from rig_identification.estimate.solve import evaluate, solve
 from rig_identification.mismatch import whole_runs
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import carried, extended, with_reference
-from rig_identification.mismatch.trial import Trial, is_ordinary, may_be_none
+from rig_identification.mismatch.screen import carried, extended, screen, with_reference
+from rig_identification.mismatch.trial import Trial, is_ordinary, mass_of, may_be_none, promises_ordinary
 from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, ordinary_alone, pruned
 from rig_identification.recording import Recording
 from rig_identification.result import Mismatch
@@ -150,9 +150,28 @@ def test_what_is_ordinary_is_in_the_model_and_no_finding(ideal: Ideal) -> None:
     theta[parameters.index_of(own.name)] = 0.02 / own.prior_std
     late = replace(lag, evaluation=replace(lag.evaluation, point=replace(point, theta=theta)))
     assert not is_ordinary(late)
+    assert promises_ordinary(lag.candidate, {own.name: 1e-3})
+    assert not promises_ordinary(lag.candidate, {own.name: 0.02})
+    assert not promises_ordinary(three.effects[0].candidate, {})
     # What the ideal model doubts itself is judged by its tolerance
     others = (t for t in three.effects if t.candidate.effect != "sensor_lag")
     assert not any(is_ordinary(as_fitted(three.fitted, t)) for t in others)
+
+
+def test_a_thousandth_of_the_body_is_on_every_rig(ideal: Ideal) -> None:
+    problem = ideal.fitted.problem
+    mass = mass_of(problem, ideal.fitted.evaluation)
+    weighed = [c for c in catalogue(problem) if c.positive and c.parameters[0].unit == "kg"]
+    problem = with_reference(problem, ideal.fitted.rest)
+    evaluation = evaluate(problem, ideal.fitted.evaluation.point)
+    assert evaluation is not None
+    asked = (p.candidate for p in screen(problem, evaluation, catalogue(problem), mass))
+    weighed += [c for c in asked if c.effect in ("sprung_mass", "liquid_slosh")]
+    assert {c.effect for c in weighed} > {"air_added_mass"}
+    for candidate in weighed:
+        name = candidate.parameters[0].name
+        assert promises_ordinary(candidate, {name: 0.0009 * mass})
+        assert not promises_ordinary(candidate, {name: 0.0012 * mass})
 
 
 def test_nothing_but_what_is_ordinary_is_no_finding(both: Explained) -> None:

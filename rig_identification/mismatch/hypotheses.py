@@ -12,7 +12,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.verdict import DOUBTED, FALSE_ALARM
 from rig_identification.mismatch.bent_cells import bent_cells
-from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.candidate import LIGHT, Candidate
 from rig_identification.mismatch.cross_sensitivity import cross_sensitivity
 from rig_identification.mismatch.drifts import drifts
 from rig_identification.mismatch.lagging_cells import lagging_cells
@@ -28,9 +28,6 @@ from rig_identification.mismatch.soft_mount import soft_mounts
 
 #: How many effects every rig has some of: cables weigh, air is taken along, an exciter's mass moves.
 EVERYWHERE = 3
-#: Part of a body that moves otherwise on every rig: its cables, connectors, the air about it. Three times as
-#: much, a thousandth, moves the inertia by less than the tolerances of a rig do, and is no finding.
-LIGHT = 1.0 / 3000.0
 
 
 def catalogue(problem: Problem) -> list[Candidate]:

@@ -24,7 +24,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.stretching import STIFFNESS
-from rig_identification.mismatch.candidate import Candidate, Told
+from rig_identification.mismatch.candidate import LIGHT, Candidate, Told
 from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, yielding_like
 from rig_identification.model import layout
 from rig_identification.model.effects import place
@@ -225,6 +225,7 @@ def rider_candidate(
         positive=1,
         tell=told,
         build=build,
+        ordinary={f"{effect}.mass": LIGHT * mass},
         twins=() if len(axes) > 1 or swing.turning else _ringing_like(problem, swing, mass),
     )
     values = {f"{effect}.mass": found}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -390,6 +390,14 @@ def is_ordinary(trial: Trial) -> bool:
     the model all the same: without it no residual of a sharp sensor is noise.
     """
     return bool(trial.candidate.ordinary) and not beyond_doubt(trial, {}, ORDINARY)
+
+
+def promises_ordinary(candidate: Candidate, values: Mapping[str, float]) -> bool:
+    """Whether the amount that first order has of an error is one that every rig has. values: by name."""
+    amounts = [p for p in candidate.parameters if p.name in candidate.ordinary]
+    return bool(amounts) and all(
+        abs(values.get(p.name, np.inf) - p.nominal) <= ORDINARY * candidate.ordinary[p.name] for p in amounts
+    )
 
 
 def strength(trial: Trial, ordinary: dict[str, float] | None = None) -> float:
