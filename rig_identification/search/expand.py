@@ -107,6 +107,25 @@ def children(
     first = _first_fits(standing, promised_here, budget, say) + taut
     first += _giving_way(standing, first, budget, say) if rung.alone else []
     first += _alike(standing, first, left, budget, say)
+    walked = _walked(problem, standing, first, budget, say)
+    if not any(w.rung.alone for w in walked):
+        walked += _unbent(standing, left, promised_here, budget, say)
+    sense = [s for s in walked if makes_sense(s, problem)]
+    absurd = {s.found[-1].kind for s in walked} - {s.found[-1].kind for s in sense}
+    behind = [p for p in promises if p.candidate.kind not in absurd] if absurd else []
+    fitted = {id(p) for p in promised_here}
+    others = [p for p in worthy(behind, count_of(candidates)) if id(p) not in fitted]
+    if others and not any(leaves_noise(s.rung) for s in sense):
+        # An absurd one that promises the most had kept all others from a fit
+        again = _walked(problem, standing, _first_fits(standing, others, budget, say), budget, say)
+        sense += [s for s in again if makes_sense(s, problem)]
+    return _clocks_and_lags(sorted((earned(standing, s) for s in sense), key=lambda s: -s.evidence))
+
+
+def _walked(
+    problem: Problem, standing: Standing, first: list[Standing], budget: Budget, say: Say
+) -> list[Standing]:
+    """The most likely of some first fits at their own levels, with closer descriptions of them."""
     first = [child for child in first if not contradicted(_last_of(child))]
     first.sort(key=lambda child: -child.rung.within_reach)
     walked: list[Standing] = []
@@ -126,10 +145,7 @@ def children(
             walked.append(replace(child, rung=down))
             if not leaves_noise(down):
                 walked += _closer(problem, walked[-1], budget, say)
-    if not any(w.rung.alone for w in walked):
-        walked += _unbent(standing, left, promised_here, budget, say)
-    sensible = (earned(standing, s) for s in walked if makes_sense(s, problem))
-    return _clocks_and_lags(sorted(sensible, key=lambda s: -s.evidence))
+    return walked
 
 
 def _screened(rung: Rung, found: tuple[Candidate, ...], left: list[Candidate], say: Say) -> list[Promise]:
