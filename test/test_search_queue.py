@@ -270,25 +270,29 @@ def test_of_each_kind_a_few_of_the_best_promises_are_worth_a_fit() -> None:
     assert worthy([promise("c", 1.0)], 10) == []
 
 
-def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However likely it is: where two devices share a clock neither can be late."""
+def children_of(
+    monkeypatch: pytest.MonkeyPatch, promises: list[Promise], absurd: tuple[str, ...] = ()
+) -> tuple[list[str], list[str]]:
+    """Children where each fit gains what was promised; and what was fitted. absurd: effects of no sense."""
+    fitted: list[str] = []
 
     def begun(standing: Standing, promise: Promise, *_: object) -> Standing:
+        fitted.append(promise.candidate.effect)
         return _model(promise.candidate.effect, promise.gain)
 
     monkeypatch.setattr(expand, "begun_with", begun)
     monkeypatch.setattr(expand, "_alike", lambda *_: [])
     monkeypatch.setattr(expand, "contradicted", lambda trial: trial.candidate.effect == "clock")
-    monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, level))
+    monkeypatch.setattr(expand, "walked_down", lambda model, point, level: _Rung(point, 5))
     monkeypatch.setattr(expand, "_closer", lambda *_: [])
+    monkeypatch.setattr(expand, "_unbent", lambda *_: [])
     monkeypatch.setattr(expand, "leaves_noise", lambda rung: False)
     monkeypatch.setattr(expand, "_giving_way", lambda *_: [])
     monkeypatch.setattr(expand, "_stretching", lambda *_: [])
     monkeypatch.setattr(expand, "_clocks_and_lags", lambda ranked: ranked)
     monkeypatch.setattr(expand, "_last_of", lambda child: SimpleNamespace(candidate=child.found[-1]))
-    monkeypatch.setattr(expand, "makes_sense", lambda standing, ordinary: True)
+    monkeypatch.setattr(expand, "makes_sense", lambda standing, _: standing.found[-1].effect not in absurd)
     monkeypatch.setattr(expand, "earned", lambda before, after: after)
-    promises = [promise("clock", 100.0), promise("lag", 80.0)]
     candidates = [p.candidate for p in promises]
     found = expand.children(
         None,  # type: ignore[arg-type]
@@ -298,7 +302,20 @@ def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPa
         lambda label: None,
         promises,
     )
-    assert [child.label for child in found] == ["lag"]
+    return [child.label for child in found], fitted
+
+
+def test_a_clock_that_stamps_contradict_is_no_child(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However likely it is: where two devices share a clock neither can be late."""
+    assert children_of(monkeypatch, [promise("clock", 100.0), promise("lag", 80.0)])[0] == ["lag"]
+
+
+def test_what_ends_absurd_keeps_nothing_from_a_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tenth of the best promise is too little for a fit only where the best one makes sense."""
+    promises = [promise("mount", 1000.0), promise("springs", 80.0), promise("tank", 70.0)]
+    assert children_of(monkeypatch, promises) == (["mount"], ["mount"])
+    found = children_of(monkeypatch, promises, absurd=("mount",))
+    assert found == (["springs", "tank"], ["mount", "springs", "tank"])
 
 
 @pytest.mark.parametrize(
