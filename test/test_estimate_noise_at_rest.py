@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import pose_problem
-from rig_identification.estimate.noise_at_rest import told
+from rig_identification.estimate.noise_at_rest import FORCE, Colour, told, with_slow_noise
 from rig_identification.recording import Recording, Series, Session
 from rig_identification.simulate import simulate_session
 
@@ -53,3 +53,27 @@ def test_correlated_noise_is_stronger_where_the_body_moves() -> None:
     plain = replace(cell, slow=None)
     np.testing.assert_allclose(cell.grouped_variance, plain.grouped_variance * cell.slow[0] ** 2)
     assert "cable_2: its tension" in told(problem.runs)[0]
+
+
+def test_an_axis_that_shows_nothing_is_as_noisy_as_elsewhere() -> None:
+    """Its samples are all the same: no frequency is one at which it moves."""
+    problem, _, _ = pose_problem(hanging(0.0, 1))
+    run = problem.runs[0]
+    cell = next(c for c in run.channels if c.quantity == "tension")
+    still = replace(run, channels=(replace(cell, values=np.full_like(cell.values, 100.0)),))
+    colour = Colour(0.01, np.zeros(1), np.array([0.5]), np.array([True]), np.array([0.6]))
+    (louder,) = with_slow_noise((still,), {(cell.device, cell.quantity): colour})
+    assert louder.channels[0].slow == pytest.approx([np.exp(0.3)])
+    white = with_slow_noise((run,), {FORCE: colour})[0]
+    assert white.channels == run.channels
+
+
+def test_what_noise_leaves_at_each_frequency_is_no_evidence() -> None:
+    """Louder than taken for where the spectrum says so, and nowhere quieter."""
+    colour = Colour(0.01, np.zeros(1), np.array([0.5]), np.array([True]), np.array([0.6]))
+    problem, _, _ = pose_problem(hanging(0.0, 1))
+    cell = next(c for c in problem.runs[0].channels if c.quantity == "tension")
+    cell = replace(cell, slow=np.array([1.1]), colour=colour)
+    low, high = cell.power_of_noise(cell.axes[0], np.array([0.0, 45.0]))
+    assert low == pytest.approx(np.exp(0.5) / 1.21)
+    assert high == 1.0

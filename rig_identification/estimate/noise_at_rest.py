@@ -100,15 +100,17 @@ def _where_it_moves(series: Series, noise: Array, colour: Colour) -> Array:
     """(w,) power of the noise at the frequencies of what samples (n, w) measure, in that of white noise.
 
     A signal of power P(f) in noise of power S(f) tells as much as in white noise of sum P / sum (P / S)
-    (Whittle's likelihood).
+    (Whittle's likelihood). Of an axis that shows no signal it is that up to where a rig moves.
     """
+    anywhere = np.where(colour.shown, np.exp(np.maximum(colour.mean, 0.0)), 1.0)
     part = _spectrum(series, noise)
     if part is None:
-        return np.exp(np.maximum(colour.mean, 0.0))
+        return anywhere
     frequency, power = part
     loud = colour.power(frequency)
     signal = np.maximum(power - loud, 0.0)
-    return np.asarray(np.sum(signal, axis=0) / np.maximum(np.sum(signal / loud, axis=0), TINY))
+    there = np.sum(signal, axis=0), np.sum(signal / loud, axis=0)
+    return np.where(there[1] > 0.0, there[0] / np.maximum(there[1], TINY), anywhere)
 
 
 def told(runs: Iterable[Run]) -> tuple[str, ...]:
