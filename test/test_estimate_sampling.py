@@ -165,6 +165,15 @@ def test_a_blow_is_moved_by_all_of_it_and_a_swing_by_little_of_its_noise(shape: 
     assert moved.rate_noise == pytest.approx(rate_noise(grid.step, WIDTHS[0 if shape == "swing" else -2]))
 
 
+@pytest.mark.parametrize(("step", "samples"), [(0.05, 400), (0.005, 10)])
+def test_wide_nodes_and_few_samples_are_smoothed_widely(step: float, samples: int) -> None:
+    time = step * np.arange(samples)
+    force = 90.0 * np.sign(np.sin(7.0 * time))[:, None]
+    made = node_input(Grid(step, samples), time, force, 0.3)
+    assert made.rate_noise == pytest.approx(rate_noise(step, WIDTHS[0]))
+    assert np.all(np.isfinite(made.late_by(1e-3)[0]))
+
+
 @pytest.mark.parametrize("rate", [200.0, 500.0])
 def test_the_noise_of_an_input_reaches_a_group_by_way_of_nodes(rate: float) -> None:
     """What is claimed of it is what noise itself does."""

@@ -65,14 +65,13 @@ def smoothed(
     """An input (nodes, w) at nodes ``step`` s apart without its noise, and the Gaussian's width, s.
 
     time (n,), values (n, w): the samples that it is of; noise: standard deviation of one. The widest Gaussian
-    that takes off noise alone; the narrowest where none does, as of jumps and of samples without noise. Of too
-    few samples to tell it is the widest.
+    that takes off noise alone; the narrowest where none does, as of jumps and of samples without noise; the
+    widest where too few samples tell, or nodes lie too far apart for a narrower one.
     """
     inside = (time >= 0.0) & (time <= step * (len(nodes) - 1))
     time, values = time[inside], values[inside]
-    widths = WIDTHS[NARROWEST * step <= WIDTHS]
-    if time.size < SHORT:
-        widths = widths[:1]
+    narrow = np.count_nonzero(NARROWEST * step <= WIDTHS) if time.size >= SHORT else 0
+    widths = WIDTHS[: max(1, narrow)]
     for width in widths[:-1]:
         smooth = smoothed_input(step, nodes, width)
         if noise > 0.0 and noise_alone(
