@@ -73,7 +73,7 @@ class Turning:
     def begun(self, law: Candidate) -> tuple[Problem, Evaluation]:
         """A model with one law of next to no amount, at the true body."""
         problem = extended(self.bare, (law,))
-        theta = np.append(self.point.theta, 1e-3)
+        theta = np.concatenate([self.point.theta, [1e-3], np.zeros(len(law.parameters) - 1)])
         evaluation = evaluate(problem, replace(self.point, theta=theta))
         assert evaluation is not None
         return problem, evaluation

@@ -235,7 +235,10 @@ def _model(
 
 
 def _candidate(problem: Problem, lab: Laboratory, stated: Stated) -> Candidate | None:
-    """The hypothesis that has the stated numbers."""
+    """The hypothesis that has the stated numbers, and none besides where one has.
+
+    An earlier version may have had fewer numbers: what is not stated is as it is described.
+    """
     rig, model, mass = lab.spec.rig, problem.bench.parameters.model, float(lab.spec.elements[0])
     known = catalogue(problem)
     if not gives_way(model):
@@ -245,9 +248,8 @@ def _candidate(problem: Problem, lab: Laboratory, stated: Stated) -> Candidate |
         ]
         known += _riders(problem, stated, mass)
     names = set(stated.numbers)
-    return next(
-        (c for c in known if c.effect == stated.effect and {q.name for q in c.parameters} == names), None
-    )
+    having = (c for c in known if c.effect == stated.effect and names <= {q.name for q in c.parameters})
+    return min(having, key=lambda c: len(c.parameters), default=None)
 
 
 def _riders(problem: Problem, stated: Stated, mass: float) -> list[Candidate]:
