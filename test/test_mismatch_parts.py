@@ -27,7 +27,7 @@ from rig_identification.mismatch.locate import DRIVE
 from rig_identification.mismatch.places import crossed, monomials, multiplied
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.rider_places import travel_along
-from rig_identification.mismatch.riders import DAMPING, FREQUENCIES, Swing, could_be, rider_candidate
+from rig_identification.mismatch.riders import DAMPING, FREQUENCIES, Swing, rider_candidate
 from rig_identification.mismatch.supports import (
     cable_elasticity,
     ceiling_candidate,
@@ -246,13 +246,3 @@ def test_a_wrench_moves_every_sample_as_running_the_model_again_does(
     alone = replace(nominal, noise=replace(nominal.noise, Q=np.zeros_like(nominal.noise.Q)))
     change = whitened_response(alone, wrench[:, :, None])[:, 0]
     assert np.max(np.abs(plain - change)) < 0.05 * np.max(np.abs(change))
-
-
-@pytest.mark.parametrize(
-    ("mass", "frequency", "liquid"),
-    [(70.0, 0.88, True), (4.0, 0.9, True), (40.0, 1.5, True), (171.0, 3.6, False)],
-)
-def test_a_liquid_swings_no_faster_than_its_tank_lets_it(mass: float, frequency: float, liquid: bool) -> None:
-    """An engine of 171 kg at 3.6 Hz would be a tank of seven centimetres."""
-    assert could_be(Swing("xy", frequency), mass, 9.81) is liquid
-    assert could_be(Swing("x", frequency), mass, 9.81)

@@ -57,24 +57,6 @@ class Swing:
         return "liquid_slosh" if self.directions == "xy" else "sprung_mass"
 
 
-#: kg/m3, of a liquid; and how many tanks, or compartments of one, may swing as one.
-LIQUID, COMPARTMENTS = 1000.0, 30.0
-
-
-def could_be(swing: Swing, mass: float, gravity: float) -> bool:
-    """Whether so much (kg) of a thing can swing at that frequency.
-
-    The surface of a tank of radius R swings at w^2 <= 1.84 g / R, and what swings under it is at most
-    1.43 rho R^3 (Abramson, "The dynamic behavior of liquids in moving containers", NASA SP-106, 1966,
-    chapter 6: of a deep tank). So the less liquid swings the faster it does: 294 kg at 0.88 Hz, 0.06 kg at
-    3.6 Hz. What is heavier rides on springs.
-    """
-    if swing.effect != "liquid_slosh":
-        return True
-    radius = 1.84 * gravity / (2.0 * np.pi * swing.frequency) ** 2
-    return bool(mass <= COMPARTMENTS * 1.43 * LIQUID * radius**3)
-
-
 #: Swings that are tried; neighbours tell much the same, and count once.
 SWINGS = tuple(Swing(d, f) for d in DIRECTIONS for f in FREQUENCIES[::2])
 #: Numbers of a rider: mass, place, frequency, damping; of each axis that it turns about: inertia, frequency.

@@ -41,7 +41,6 @@ from rig_identification.mismatch.riders import (
     NUMBERS,
     SWINGS,
     Swing,
-    could_be,
     middle_of,
     rider_candidate,
 )
@@ -241,8 +240,7 @@ def _riders(problem: Problem, beyond: Beyond, mass: float, count: int) -> list[P
     for ridden in scanned(problem, beyond, mass):
         effect = ridden.swing.effect
         # A second one of an effect would write its numbers over the first one's
-        heavy = float(ridden.best.amounts[0])
-        if f"{effect}.mass" not in taken and could_be(ridden.swing, heavy, problem.bench.rig.gravity):
+        if f"{effect}.mass" not in taken:
             swings = found.setdefault((effect, ridden.swing.directions), [])
             most = max([ridden.best.gain, *(r.best.gain for r in swings)])
             swings.append(ridden if ridden.best.gain > KEPT * most else replace(ridden, runs=[]))
