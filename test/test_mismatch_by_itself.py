@@ -18,7 +18,7 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.screen import carried, extended, screen, with_reference
-from rig_identification.mismatch.trial import Trial, is_ordinary, mass_of, may_be_none, promises_ordinary
+from rig_identification.mismatch.trial import Trial, is_ordinary, mass_of, may_be_none, ordinary_amount
 from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, ordinary_alone, pruned
 from rig_identification.recording import Recording
 from rig_identification.result import Mismatch
@@ -150,9 +150,9 @@ def test_what_is_ordinary_is_in_the_model_and_no_finding(ideal: Ideal) -> None:
     theta[parameters.index_of(own.name)] = 0.02 / own.prior_std
     late = replace(lag, evaluation=replace(lag.evaluation, point=replace(point, theta=theta)))
     assert not is_ordinary(late)
-    assert promises_ordinary(lag.candidate, {own.name: 1e-3})
-    assert not promises_ordinary(lag.candidate, {own.name: 0.02})
-    assert not promises_ordinary(three.effects[0].candidate, {})
+    assert ordinary_amount(lag.candidate, {own.name: 1e-3})
+    assert not ordinary_amount(lag.candidate, {own.name: 0.02})
+    assert not ordinary_amount(three.effects[0].candidate, {})
     # What the ideal model doubts itself is judged by its tolerance
     others = (t for t in three.effects if t.candidate.effect != "sensor_lag")
     assert not any(is_ordinary(as_fitted(three.fitted, t)) for t in others)
@@ -170,8 +170,8 @@ def test_a_thousandth_of_the_body_is_on_every_rig(ideal: Ideal) -> None:
     assert {c.effect for c in weighed} > {"air_added_mass"}
     for candidate in weighed:
         name = candidate.parameters[0].name
-        assert promises_ordinary(candidate, {name: 0.0009 * mass})
-        assert not promises_ordinary(candidate, {name: 0.0012 * mass})
+        assert ordinary_amount(candidate, {name: 0.0009 * mass})
+        assert not ordinary_amount(candidate, {name: 0.0012 * mass})
 
 
 def test_nothing_but_what_is_ordinary_is_no_finding(both: Explained) -> None:

@@ -106,7 +106,7 @@ def _where_it_moves(series: Series, noise: Array, colour: Colour) -> Array:
     part = _spectrum(series, noise)
     if part is None:
         return anywhere
-    frequency, power = part
+    _, frequency, power = part
     loud = colour.power(frequency)
     signal = np.maximum(power - loud, 0.0)
     there = np.sum(signal, axis=0), np.sum(signal / loud, axis=0)
@@ -227,8 +227,7 @@ def _bands(series: Series, noise: Array) -> Bands | None:
     part = _spectrum(series, noise)
     if part is None:
         return None
-    frequency, power = part
-    step = 0.5 / float(frequency[-1])
+    step, frequency, power = part
     angle = 2.0 * np.pi * step * frequency
     kept = np.array_split(np.arange(DRIFTING + 1, angle.size - 1), max(1, (angle.size - DRIFTING) // BAND))
     if len(kept) < FEWEST:
@@ -243,8 +242,8 @@ def _bands(series: Series, noise: Array) -> Bands | None:
     )
 
 
-def _spectrum(series: Series, noise: Array) -> tuple[Array, Array] | None:
-    """Frequencies (n,) Hz and power (n, w) of samples, in that of white noise; None of too few to tell.
+def _spectrum(series: Series, noise: Array) -> tuple[float, Array, Array] | None:
+    """Step (s) of samples, frequencies (n,) Hz, and power (n, w) in that of white noise; None of too few.
 
     A sample that is missing here and there is drawn between its neighbours.
     """
@@ -255,4 +254,4 @@ def _spectrum(series: Series, noise: Array) -> tuple[Array, Array] | None:
     even = np.stack([np.interp(time, series.time, v) for v in series.values.T], axis=1) / noise
     # A straight line leaks into all that is slow
     power = np.abs(np.fft.rfft(detrend(even, axis=0), axis=0)) ** 2 / time.size
-    return np.asarray(np.fft.rfftfreq(time.size, step)), power
+    return step, np.asarray(np.fft.rfftfreq(time.size, step)), power

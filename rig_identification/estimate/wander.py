@@ -14,6 +14,7 @@ means scatter as their blocks do (rest_evidence.py).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,11 +39,20 @@ ZEROS = {
     "specific_force": "accelerometer_bias",
     "inclination": "inclinometer_orientation",
 }
+#: ... and of its gain.
+GAINS = {
+    "tension": "load_cell_gain",
+    "angular_rate": "gyroscope_scale",
+    "specific_force": "accelerometer_scale",
+}
 
 
-def wander_of(rig: Rig, quantity: str) -> float:
-    """Std of a run's own deviation from a quantity's zero, in its unit; 0 where it has none."""
-    name = ZEROS.get(quantity)
+def wander_of(rig: Rig, quantity: str, tolerances: Mapping[str, str] = ZEROS) -> float:
+    """Std of a run's own deviation from a quantity's zero, in its unit; 0 where it has none.
+
+    tolerances: GAINS for that from its gain.
+    """
+    name = tolerances.get(quantity)
     return 0.0 if name is None else WANDER * rig.tolerance[name]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rig_identification.estimate.estimates import Estimates
 from rig_identification.estimate.parameters import AXES, Parameter, ParameterSet
-from rig_identification.estimate.wander import WANDER, wander_of
+from rig_identification.estimate.wander import GAINS, wander_of
 from rig_identification.mismatch.candidate import Candidate, Told
 from rig_identification.model import sensors
 from rig_identification.rig import Rig
@@ -28,12 +28,6 @@ INCLINOMETER = tuple(("inclination", a, "rad", 5e-4) for a in "xy")
 SETTLING, SETTLING_SPREAD = 0.05, 0.1
 #: Plausible rate of a gain (std of the prior), 1/s: half a percent in ten seconds.
 GAIN = 5e-4
-#: Tolerance of each quantity's gain.
-GAINS = {
-    "tension": "load_cell_gain",
-    "angular_rate": "gyroscope_scale",
-    "specific_force": "accelerometer_scale",
-}
 #: By what name the result has a drift, of what it is, and what to do.
 ZERO = ("drift", "zero", "Let it warm up before recording, and zero it then.")
 SCALE = ("gain_drift", "gain", "Let it warm up before recording, and calibrate it then.")
@@ -60,8 +54,8 @@ def drifts(rig: Rig, parameters: ParameterSet, devices: list[str], duration: flo
             of_gain = Parameter(
                 f"{name}.gain", "1/s", 0.0, GAIN, "device", laws[f"{name}.gain"], bounded=False
             )
-            known = WANDER * rig.tolerance.get(GAINS.get(quantity, ""), 0.0) / lasts
             where = {**where, "law": "gain drift"}
+            known = wander_of(rig, quantity, GAINS) / lasts
             out.append(_drift((of_gain, own[1]), "1", duration, where, known, SCALE))
     return out
 

@@ -29,6 +29,7 @@ from rig_identification.mismatch.riders import (
     DIRECTIONS,
     FREQUENCIES,
     GYRATION,
+    MASS_STD,
     TURNING_NUMBERS,
     Swing,
     filters,
@@ -146,8 +147,7 @@ def turning_too(problem: Problem, beyond: Beyond, ridden: Ridden, mass: float) -
     every = beyond.of(rows)
     information = every.information(rows)
     reach = GYRATION * float(np.max(extent(problem.bench.rig)))
-    precision = np.array([1.0, *[reach**-4] * len(AXES)]) / (0.05 * mass) ** 2
-    needed = 0.5 * float(chi2.isf(FALSE_ALARM / (len(AXES) * len(SPARSE)), TURNING_NUMBERS))
+    precision = np.array([1.0, *[reach**-4] * len(AXES)]) / (MASS_STD * mass) ** 2
 
     def of(turning: list[int]) -> Best | None:
         matrix = np.zeros((1 + len(turning), TERMS, 1 + len(turning), TERMS))
@@ -160,16 +160,13 @@ def turning_too(problem: Problem, beyond: Beyond, ridden: Ridden, mass: float) -
         count = 1 + len(turning)
         return best_place(matrix, right, precision[:count], count, 1.0, REACH)
 
-    best = ridden.best
-    chosen: list[int] = []
-    for _ in AXES:
-        left = [k for k in range(len(AXES) * len(SPARSE)) if k // len(SPARSE) not in _axes_of(chosen)]
-        tried = [(found.gain, k) for k in left if (found := of([*chosen, k])) is not None]
-        if not tried or max(tried)[0] - best.gain < needed:
-            break
-        chosen.append(max(tried)[1])
-        best = of(chosen) or best
-    if not chosen or not np.all(best.amounts > 0.0):
+    def gain(turning: list[int]) -> float:
+        found = of(turning)
+        return -np.inf if found is None else found.gain
+
+    chosen = _axis_by_axis(len(SPARSE), set(), gain, ridden.best.gain)
+    best = of(chosen) if chosen else None
+    if best is None or not np.all(best.amounts > 0.0):
         return None
     order = np.argsort(chosen)
     columns = np.concatenate([np.arange(TERMS), TERMS + np.array(chosen)[order]])
@@ -183,9 +180,23 @@ def turning_too(problem: Problem, beyond: Beyond, ridden: Ridden, mass: float) -
     )
 
 
-def _axes_of(turning: list[int]) -> set[int]:
-    """Axes of columns of :func:`turning_too`."""
-    return {k // len(SPARSE) for k in turning}
+def _axis_by_axis(each: int, known: set[int], gain: Callable[[list[int]], float], before: float) -> list[int]:
+    """Columns of a turning part, one of each axis that it turns about, as far as each explains some.
+
+    Column k is of axis k // each, at one of ``each`` frequencies. One axis after the other, but those known,
+    from the one that explains most. gain: of columns, nats; before: of none.
+    """
+    needed = 0.5 * float(chi2.isf(FALSE_ALARM / (len(AXES) * each), TURNING_NUMBERS))
+    chosen: list[int] = []
+    while left := [
+        k for k in range(len(AXES) * each) if k // each not in known | {c // each for c in chosen}
+    ]:
+        most, best = max((gain([*chosen, k]), k) for k in left)
+        if most - before < needed:
+            break
+        chosen.append(best)
+        before = most
+    return chosen
 
 
 def other_ways(
@@ -229,7 +240,6 @@ def turning_ways(problem: Problem, beyond: Beyond, damping: float, known: str) -
     One axis after the other, from the one that explains most by itself. damping: ratio.
     """
     each = len(FREQUENCIES)
-    needed = 0.5 * float(chi2.isf(FALSE_ALARM / (len(AXES) * each), TURNING_NUMBERS))
     wrenches = _turning_wrenches(problem, beyond.full, FREQUENCIES, damping)
     responses = [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(beyond.full.runs)]
     found = beyond.of(responses)
@@ -239,18 +249,8 @@ def turning_ways(problem: Problem, beyond: Beyond, damping: float, known: str) -
         amounts: Array = np.asarray(np.linalg.solve(information[np.ix_(columns, columns)], right[columns]))
         return (0.5 * float(amounts @ right[columns]) if np.all(amounts > 0.0) else 0.0), amounts
 
-    chosen: list[int] = []
-    gain, amounts = 0.0, np.zeros(0)
-    for _ in AXES:
-        taken = {AXES.index(a) for a in known} | {c // each for c in chosen}
-        left = [k for k in range(len(AXES) * each) if k // each not in taken]
-        if not left:
-            break
-        more, best = max((of([*chosen, k])[0], k) for k in left)
-        if more - gain < needed:
-            break
-        chosen.append(best)
-        gain, amounts = of(chosen)
+    chosen = _axis_by_axis(each, {AXES.index(a) for a in known}, lambda columns: of(columns)[0], 0.0)
+    gain, amounts = of(chosen) if chosen else (0.0, np.zeros(0))
     ways = sorted(zip(chosen, amounts, strict=True))
     return Turned(
         gain,
@@ -273,7 +273,7 @@ def _ridden(
     best = best_place(
         columns.information(own).reshape(1, TERMS, 1, TERMS),
         columns.right.reshape(1, TERMS),
-        np.array([1.0 / (0.05 * mass) ** 2]),
+        np.array([1.0 / (MASS_STD * mass) ** 2]),
         1,
         1.0,
         REACH,

@@ -389,11 +389,11 @@ def is_ordinary(trial: Trial) -> bool:
     Devices' clocks differ by tolerances, and by as much some follow late. That is no finding, and belongs in
     the model all the same: without it no residual of a sharp sensor is noise.
     """
-    return bool(trial.candidate.ordinary) and not beyond_doubt(trial, {}, ORDINARY)
+    return ordinary_amount(trial.candidate, trial.values)
 
 
-def promises_ordinary(candidate: Candidate, values: Mapping[str, float]) -> bool:
-    """Whether the amount that first order has of an error is one that every rig has. values: by name."""
+def ordinary_amount(candidate: Candidate, values: Mapping[str, float]) -> bool:
+    """Whether ``values`` (by name) of an error that the ideal model does not know are what every rig has."""
     amounts = [p for p in candidate.parameters if p.name in candidate.ordinary]
     return bool(amounts) and all(
         abs(values.get(p.name, np.inf) - p.nominal) <= ORDINARY * candidate.ordinary[p.name] for p in amounts

@@ -97,6 +97,10 @@ class Drift(NamedTuple):
     shape: Array  # of a unit rate, of either
     bend: Array  # its derivative in how fast it settles
 
+    def read(self, values: Array) -> Array:
+        """(N, w) what is read of ``values`` (N, w)."""
+        return np.asarray(values * (1.0 + self.gain) + self.zero)
+
 
 def drift(time: Array, device: Array) -> Drift:
     """How the zeros and gains of a device's axes have moved.
@@ -116,25 +120,28 @@ def drifting(reading: Reading, time: Array, device: Array) -> Reading:
 
     The derivatives in ``device`` come after the device's other numbers.
     """
-    moved = drift(time, device)
-    if reading.values.shape[0] == 1:
-        moved = Drift(*(np.mean(part, axis=0, keepdims=True) for part in moved))
-    scale = 1.0 + moved.gain
     rates, _, gains = device.reshape(-1, DRIFT_SIZE).T
 
-    def in_device() -> Array:
-        nodes, width = reading.values.shape
-        own = np.zeros((nodes, width, device.size))
-        for axis in range(width):
-            first = DRIFT_SIZE * axis
-            own[:, axis, first] = moved.shape[:, axis]
-            own[:, axis, first + DRIFT_GAIN] = moved.shape[:, axis] * reading.values[:, axis]
-            rate = rates[axis] + gains[axis] * reading.values[:, axis]
-            own[:, axis, first + 1] = rate * moved.bend[:, axis]
-        return np.concatenate([reading.in_device * scale[:, :, None], own], axis=2)
+    def moved() -> Drift:
+        whole = drift(time, device)
+        if reading.values.shape[0] > 1:
+            return whole
+        return Drift(*(np.mean(part, axis=0, keepdims=True) for part in whole))
 
-    in_raw = reading.in_raw * scale[:, :, None] if np.any(gains) else reading.in_raw
-    return Reading(reading.values * scale + moved.zero, in_raw, in_device)
+    def in_device() -> Array:
+        there, own = moved(), np.zeros((*reading.values.shape, device.size))
+        for axis, values in enumerate(reading.values.T):
+            numbers = own[:, axis, DRIFT_SIZE * axis : DRIFT_SIZE * (axis + 1)]
+            numbers[:, 0] = there.shape[:, axis]
+            numbers[:, 1] = (rates[axis] + gains[axis] * values) * there.bend[:, axis]
+            numbers[:, DRIFT_GAIN] = there.shape[:, axis] * values
+        return np.concatenate([reading.in_device * (1.0 + there.gain)[:, :, None], own], axis=2)
+
+    if not (np.any(rates) or np.any(gains)):
+        # Of the many devices that do not drift only derivatives are ever asked for
+        return Reading(reading.values, reading.in_raw, in_device)
+    here = moved()
+    return Reading(here.read(reading.values), reading.in_raw * (1.0 + here.gain)[:, :, None], in_device)
 
 
 #: load_cell: gain error 1, zero N, curve 1/N, hysteresis N, play N; then the share of each cable's tension

@@ -12,7 +12,7 @@ from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue, count_of
 from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.slack import Spell, slack_alone, taut_ideal, with_slack
-from rig_identification.mismatch.trial import mass_of, promises_ordinary
+from rig_identification.mismatch.trial import mass_of, ordinary_amount
 from rig_identification.mismatch.undecided import undecided
 from rig_identification.mismatch.whole_runs import Heard, ordinary_alone, unheard
 from rig_identification.search.changed import Asked, changes_of, explained_changed
@@ -66,7 +66,7 @@ def _hidden(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     promises = screen(problem, evaluation, candidates, mass_of(problem, evaluation))
     count = count_of(candidates)
     # As much of it as every rig has would be no finding
-    worth = [p for p in promises if not promises_ordinary(p.candidate, p.values)]
+    worth = [p for p in promises if not ordinary_amount(p.candidate, p.values)]
     if worthy(worth, count):
         found = search(ideal, Rung(problem, evaluation, ALONE), notify, budget, promises=worth).told
         if found is not None and found.wholly:

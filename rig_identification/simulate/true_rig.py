@@ -54,8 +54,7 @@ class TrueRig:
         """(N, w) what a device reads of ``values`` (N, w), ``time`` (N,) s after a recording's start."""
         if device == "mocap":
             return values
-        moved = sensors.drift(time, self.device[self.parameters.places.drift(device)])
-        return values * (1.0 + moved.gain) + moved.zero
+        return sensors.drift(time, self.device[self.parameters.places.drift(device)]).read(values)
 
     def shown(self, device: str, step: float, values: Array) -> Array:
         """(N, w) what a device shows of its readings ``values`` (N, w), ``step`` s apart."""
