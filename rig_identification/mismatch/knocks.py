@@ -9,8 +9,9 @@ is one line of action: direction d through p, impulse a_k. What knocks has that 
 
 From one blow to the next the part slides, massless, along the measured motion. Its way y from the stop that
 it hit last, sigma = sign(a_k), begins with what that blow left of its speed:
-    y'' = sigma (f + b) - c y',  y(0) = 0,  y'(0) = kappa |a_k|,  y >= 0,  f = d . f_a(p)
-f_a: specific force; b: slope of its floor, m/s^2. At the next blow y = 0, or 2 l where the other stop is hit;
+    y'' = sigma (f + b) - c y' - mu sign(y'),  y(0) = 0,  y'(0) = kappa |a_k|,  y >= 0,  f = d . f_a(p)
+f_a: specific force; b: slope of its floor, mu: its dry friction, m/s^2, which holds what is at rest as long
+as |f + b| < mu. At the next blow y = 0, or 2 l where the other stop is hit;
 and that blow's impulse is what stops it: |a_k+1| = m (1 + e) |y'|, e = kappa m (1 + e). A scan of whole runs
 (loose.py) has to have all blows right, each of which follows from the ones before; here every blow begins
 anew, and errors of some milliseconds do not grow.
@@ -61,10 +62,13 @@ FEW = 50
 FEWEST, FAINTEST = 4, 0.05
 #: Integration steps between two nodes.
 FINE = 8
-#: Ends of what is looked at: rate 1/s, speed after a middling blow m/s, slope m/s^2; and its prior's std.
-RATES, SPEEDS, SLOPES, SLOPING = (0.05, 8.0), (1e-4, 0.1), (-0.3, 0.3), 0.05
+#: Ends of what is looked at: rate 1/s, speed after a middling blow m/s, dry friction m/s^2: from next to none
+#: to that of rubber on steel; slope m/s^2, and its prior's std.
+RATES, SPEEDS, FRICTIONS, SLOPES, SLOPING = (0.05, 8.0), (1e-4, 0.1), (2e-3, 4.0), (-0.3, 0.3), 0.05
 #: The same of where its line lies, m: a body that is not known yet turns, and bends what all blows are.
 ASIDES, ASIDE = (-0.5, 0.5), 0.15
+#: Share of a line's direction that has to be level for it to be taken for a level one.
+LEVEL = 0.5
 #: Differential evolution: members for each number, generations.
 PEOPLE, GENERATIONS = 12, 40
 #: Nats that a slide may be less likely than the best and still be as likely: two std of a normal error.
@@ -73,8 +77,9 @@ TWO_STD = 2.0
 STILL, NEVER, NOTHING_LIKE = 1e-4, 1.0, 3.0
 #: Least scales of times (s) and log sizes.
 SHARPEST, ALIKE = 0.005, 0.05
-#: Numbers that are looked for: rate, rebound, slope, line, travel, weight, and scales; and of them scales.
-NUMBERS, SCALES = 9, 2
+#: Numbers that are looked for: rate, rebound, friction, slope, line, travel, weight, and scales; and of them
+#: scales.
+NUMBERS, SCALES = 10, 2
 
 
 @dataclass(frozen=True)
@@ -188,10 +193,11 @@ def sizes(spikes: Spikes, spike: Array) -> Array:
     return np.asarray(spikes.whitened @ row / (row @ row))
 
 
-def lines_of(spike: Array, blow: Array) -> list[Line]:
-    """The lines of action that blows may have: along the body's nearest axis, and as it is measured.
+def lines_of(spike: Array, blow: Array, down: Array) -> list[Line]:
+    """The lines of action that blows may have: along the body's nearest axis, level, and as it is measured.
 
-    spike, blow: (6,) what such a blow shows of itself in a node or two, and what it is.
+    spike, blow: (6,) what such a blow shows of itself in a node or two, and what it is. down: (3,) gravity in
+    the body at rest: what slides freely down a floor does not leave its stop again.
     """
     force = float(np.linalg.norm(blow[:3]))
     if force == 0.0:
@@ -199,7 +205,10 @@ def lines_of(spike: Array, blow: Array) -> list[Line]:
     along, moment = blow[:3] / force, blow[3:] / force
     nearest, axis = int(np.argmax(np.abs(along))), np.zeros(3)
     axis[nearest] = np.sign(along[nearest])
-    return [Line(d, np.cross(d, moment), spike, force) for d in (axis, along)]
+    level = along - (along @ down) / (down @ down) * down
+    length = float(np.linalg.norm(level))
+    directions = [axis, along] if length < LEVEL else [axis, level / length, along]
+    return [Line(d, np.cross(d, moment), spike, force) for d in directions]
 
 
 def _blow_of(told: Sequence[tuple[Sequence[Spikes], Beyond]], spike: Array) -> Array:
@@ -224,7 +233,7 @@ def _blow_of(told: Sequence[tuple[Sequence[Spikes], Beyond]], spike: Array) -> A
 
 
 @njit(cache=True, nogil=True)
-def _flights(force, first, last, side, speed, step, rate, slope, out):  # type: ignore[no-untyped-def]
+def _flights(force, first, last, side, speed, step, rate, friction, slope, out):  # type: ignore[no-untyped-def]
     """out (G, 2): way (m) from the stop that was left and its rate at the end of each gap.
 
     A part that has come back already is beyond the stop by what it would have gone since.
@@ -238,6 +247,8 @@ def _flights(force, first, last, side, speed, step, rate, slope, out):  # type: 
                 f = force[k] + (force[k + 1] - force[k]) * (s + 0.5) / FINE + slope
                 away = y > 0.0
                 v += h * (side[g] * f - rate * v)
+                # Dry friction takes no more than all of the speed in a step (implicit Euler)
+                v = max(v - h * friction, 0.0) if v > 0.0 else min(v + h * friction, 0.0)
                 y += h * v
                 since += h
                 if y < 0.0:
@@ -296,7 +307,8 @@ class Gaps:
         speed = slide.left * np.abs(self.before)
         side = np.sign(self.before)
         force = self._force @ np.array([1.0, *slide.aside])
-        _flights(force, self._first, self._last, side, speed, self._step, slide.rate, slide.slope, out)
+        numbers = slide.rate, slide.friction, slide.slope
+        _flights(force, self._first, self._last, side, speed, self._step, *numbers, out)
         return out[:, 0], np.where(self.same, -out[:, 1], out[:, 1])
 
 
@@ -317,6 +329,7 @@ class Slide:
 
     rate: float  # 1/s: what slows it
     left: float  # m/s after a blow of one N s
+    friction: float  # m/s^2: dry friction per kilogram
     slope: float  # m/s^2, of its floor
     aside: tuple[float, float] = (0.0, 0.0)  # m, by which its line is off, along ``Line.across``
 
@@ -378,6 +391,7 @@ def _likely(gaps: Gaps) -> list[Arrival]:
     bounds = [
         (float(np.log(RATES[0])), float(np.log(RATES[1]))),
         (float(np.log(SPEEDS[0] / middling)), float(np.log(SPEEDS[1] / middling))),
+        (float(np.log(FRICTIONS[0])), float(np.log(FRICTIONS[1]))),
         SLOPES,
         ASIDES,
         ASIDES,
@@ -385,9 +399,9 @@ def _likely(gaps: Gaps) -> list[Arrival]:
     seen: list[tuple[float, Arrival]] = []
 
     def unlikely(x: Array) -> float:
-        aside = float(x[3]), float(x[4])
-        there = _arrival(gaps, Slide(float(np.exp(x[0])), float(np.exp(x[1])), float(x[2]), aside))
-        far = (x[2] / SLOPING) ** 2 + (x[3] / ASIDE) ** 2 + (x[4] / ASIDE) ** 2
+        rate, left, friction = (float(v) for v in np.exp(x[:3]))
+        there = _arrival(gaps, Slide(rate, left, friction, float(x[3]), (float(x[4]), float(x[5]))))
+        far = (x[3] / SLOPING) ** 2 + (x[4] / ASIDE) ** 2 + (x[5] / ASIDE) ** 2
         seen.append((0.5 * float(far) - there.nats, there))
         return seen[-1][0]
 
@@ -428,7 +442,8 @@ def knocking(seen: tuple[Problem, Evaluation], held: tuple[Problem, Evaluation])
     if spike is None:
         return None
     blow = _blow_of([(fitted, beyond_of(*seen)), (others, beyond_of(*held, fixed=True))], spike)
-    return likelier(lines_of(spike, blow), fitted, others)
+    down = fitted[0].motion.outputs[0, layout.OUT_GRAVITY : layout.OUT_GRAVITY + 3]
+    return likelier(lines_of(spike, blow, down), fitted, others)
 
 
 def likelier(lines: Sequence[Line], fitted: Sequence[Spikes], held: Sequence[Spikes]) -> Knocks | None:

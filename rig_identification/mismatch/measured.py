@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.follow import SPEED, START, followed
-from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.estimate.track import smoothed_from, wrench_noise
@@ -20,11 +19,10 @@ from rig_identification.model.motion import on_cables
 
 Array = NDArray[np.float64]
 
-#: Std of the random wrench, over a tenth of a second, as a share of the body's weight: at first, and least.
-SHARE, LEAST = 0.05, 1e-4
-#: Factor between the random wrenches of which the weakest is looked for, and the mean square of whitened
-#: residuals at which one is strong enough.
-STRONGER, ENOUGH = 3.0, 1.1
+#: Std of the random wrench, over a tenth of a second, as a share of the body's weight; and those, each weaker
+#: than the one before, of which the likeliest is looked for. Beside a weaker one than the last what is fitted
+#: takes a blow up.
+SHARE, SHARES = 0.05, tuple(1e-4 * 3.0**k for k in range(6, -1, -1))
 #: Rounds in which the motion is brought to what was measured.
 ROUNDS = 2
 
@@ -45,22 +43,23 @@ def with_wrench(
 
 
 def measured(problem: Problem, point: Point, mass: float) -> tuple[Problem, Evaluation] | None:
-    """The problem with the weakest random wrench with which it leaves noise, about the measured motion.
+    """The problem with the likeliest random wrench, about the measured motion.
 
-    None where a run cannot be followed. mass: kg, roughly. The random wrench is in the point's latents.
+    What no wrench accounts for, such as a cable that rings, asks for none: one that is strong enough to take
+    it up all the same hides what a blow is. None where a run cannot be followed. mass: kg, roughly. The
+    random wrench is in the point's latents.
     """
-    share, there, found = LEAST, replace(point, latents=()), None
-    while found is None:
+    there = replace(point, latents=())
+    found: tuple[Problem, Evaluation] | None = None
+    for share in SHARES:
         wide = with_wrench(problem, there, mass, share)
-        if wide is None:
-            return None
+        evaluation = None if wide is None else evaluate(*wide)
+        if wide is None or evaluation is None or (found is not None and evaluation.cost > found[1].cost):
+            break
         noisy, there = wide
-        evaluation = evaluate(noisy, there)
-        if evaluation is None:
-            return None
-        if misfit(evaluation) < ENOUGH or share >= SHARE:
-            found = noisy, evaluation
-        share *= STRONGER
+        found = noisy, evaluation
+    if found is None:
+        return None
     for _ in range(ROUNDS):
         moved = _smoothed(*found)
         if moved is None:

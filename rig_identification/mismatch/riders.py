@@ -46,7 +46,7 @@ DIRECTIONS = {"x": ("x",), "y": ("y",), "z": ("z",), "xy": ("x", "y")}
 class Swing:
     """One scanned rider."""
 
-    directions: str  # key of DIRECTIONS, or "xyz" where each axis has its own frequency
+    directions: str  # key of DIRECTIONS, or several axes of which each has its own frequency
     frequency: float  # Hz, the lowest
     along: tuple[float, ...] = ()  # Hz, of each axis where they differ
     turning: tuple[tuple[str, float], ...] = ()  # axes that it turns about as well, and Hz about each
@@ -54,7 +54,7 @@ class Swing:
     @property
     def effect(self) -> str:
         """Word of the recording contract."""
-        return "liquid_slosh" if self.directions == "xy" else "sprung_mass"
+        return "liquid_slosh" if self.directions == "xy" and not self.along else "sprung_mass"
 
 
 #: Swings that are tried; neighbours tell much the same, and count once.

@@ -339,8 +339,8 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
         gain -= _unearned(problem, beyond, found.columns, found.weights, runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
-    if found.swing.effect == "sprung_mass":
-        candidate = replace(candidate, between=partial(_more_ways, found.swing, mass))
+    more = _more_ways if found.swing.effect == "sprung_mass" else _on_springs
+    candidate = replace(candidate, between=partial(more, found.swing, mass))
     for (a, _), inertia in zip(found.swing.turning, best.amounts[1:], strict=True):
         values[f"{found.swing.effect}.inertia.{a}"] = float(inertia)
         values[f"{found.swing.effect}.turning_damping_ratio.{a}"] = found.damping
@@ -391,6 +391,29 @@ def _more_ways(
             start |= {name: value for name, value in kept.items() if name in names}
             out.append((candidate, start | own))
     return out
+
+
+def _on_springs(
+    swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
+) -> list[tuple[Candidate, dict[str, float]]]:
+    """A fitted liquid as a part on springs, along the vertical too where that explains some.
+
+    Both swing along two axes, and to first order alike. A part on springs need not move as freely along both,
+    and does not rise as it swings. mass: kg, of the body.
+    """
+    values = problem.bench.parameters.named(evaluation.point.theta)
+    amount, frequency = values[f"{swing.effect}.mass"], values[f"{swing.effect}.frequency"]
+    opened = opened_with(problem, evaluation, []) if amount > 0.0 else None
+    if opened is None or "sprung_mass.mass" in values:
+        return []
+    at = np.array([values[f"{swing.effect}.position.{a}"] for a in AXES])
+    ways = other_ways(problem, opened[1], swing.directions, amount, at)
+    along = dict.fromkeys(swing.directions, frequency) | {a: f for a, (f, _) in ways.items()}
+    moving = Swing("".join(along), min(along.values()), tuple(along.values()))
+    candidate, start = rider_candidate(problem, moving, mass, amount, at)
+    damping = values[f"{swing.effect}.damping_ratio"]
+    candidate = replace(candidate, between=partial(_more_ways, moving, mass))
+    return [(candidate, start | {f"{moving.effect}.damping_ratio": damping})]
 
 
 def _unearned(problem: Problem, beyond: Beyond, columns: Columns, amounts: Array, runs: list[Array]) -> float:

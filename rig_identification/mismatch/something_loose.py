@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig_identification.estimate.evidence import Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.solve import Evaluation, Point, Problem
 from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.knocks import Knocks, knocking
+from rig_identification.mismatch.knocks import Knocks, Line, knocking
 from rig_identification.mismatch.loose import FARTHEST, LIKELY, Along, Gain, Loose, likeliest
 from rig_identification.mismatch.measured import measured
 from rig_identification.mismatch.rider_places import spread_of
 from rig_identification.mismatch.riders import middle_of
+from rig_identification.mismatch.ringing import without_ringing
 from rig_identification.mismatch.screen import screen, with_reference
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.quantity import with_interval
@@ -30,6 +33,8 @@ TIMED, WEIGHED = 0.5, 1.0
 #: Nats by which a loose part has to be likelier than all else, and by which held-out runs have to confirm it,
 #: or by which the times and sizes of its blows are likelier than chance.
 AHEAD, CONFIRMED = 30.0, 10.0
+#: Angle (rad) from a body axis from which on a line is told by its direction.
+ASLANT = 0.1
 
 
 def loose_finding(fitted: Fitted, before: float | None, *, scan: bool = True) -> Finding | None:
@@ -38,15 +43,20 @@ def loose_finding(fitted: Fitted, before: float | None, *, scan: bool = True) ->
     fitted: whole runs, each from rest. before: held-out error of the ideal model. scan: whether it is looked
     for by all of its wrench as well, which takes some ten seconds more.
     """
-    problem, point = with_reference(fitted.problem, fitted.rest), fitted.evaluation.point
+    problem = with_reference(fitted.problem, fitted.rest)
     mass = mass_of(problem, fitted.evaluation)
-    seen = measured(problem, point, mass)
+    seen, held = measured(problem, fitted.evaluation.point, mass), _held_out(fitted, problem, mass)
     if seen is None:
         return None
-    middle, held = middle_of(problem.bench.rig), _held_out(fitted, problem, mass)
-    knocks = None if held is None else knocking(seen, held)
-    if knocks is not None and knocks.confirmed > 0.0 and knocks.timed > CONFIRMED:
-        return _told_by_blows(knocks, middle, before) if knocks.mass < FARTHEST * LIKELY * mass else None
+    middle = middle_of(problem.bench.rig)
+    knocks = _convincing(seen, held, mass)
+    if knocks is None:
+        # Blows may be told best by what does not ring with them
+        calm = replace(problem, runs=tuple(map(without_ringing, problem.runs)))
+        calm_seen = measured(calm, fitted.evaluation.point, mass)
+        knocks = _convincing(calm_seen, _held_out(fitted, calm, mass, without_ringing), mass)
+    if knocks is not None:
+        return _told_by_blows(knocks, middle, before)
     if not scan:
         return None
     along = Along(*seen, mass)
@@ -62,12 +72,27 @@ def loose_finding(fitted: Fitted, before: float | None, *, scan: bool = True) ->
     return _told(part, between, gain, again, before)
 
 
-def _held_out(fitted: Fitted, problem: Problem, mass: float) -> tuple[Problem, Evaluation] | None:
+#: A problem about its measured motion (measured.py); None where that cannot be followed.
+Measured = tuple[Problem, Evaluation] | None
+
+
+def _convincing(seen: Measured, held: Measured, mass: float) -> Knocks | None:
+    """What knocks in fitted and held-out runs, where its blows' times convince. mass: kg, of the body."""
+    knocks = None if seen is None or held is None else knocking(seen, held)
+    if knocks is None or knocks.confirmed <= 0.0 or knocks.timed <= CONFIRMED:
+        return None
+    return knocks if knocks.mass < FARTHEST * LIKELY * mass else None
+
+
+def _held_out(
+    fitted: Fitted, problem: Problem, mass: float, prepared: Callable[[Run], Run] | None = None
+) -> Measured:
     """Held-out runs about their measured motion; None where there is none that can be followed."""
     if not fitted.holdouts:
         return None
     point = fitted.evaluation.point
-    held = replace(problem, runs=fitted.holdout_runs, rests=())
+    runs = fitted.holdout_runs if prepared is None else tuple(map(prepared, fitted.holdout_runs))
+    held = replace(problem, runs=runs, rests=())
     starts = tuple(run.motion.state(0) for run in fitted.holdouts)
     return measured(held, Point(point.theta, starts, ()), mass)
 
@@ -83,14 +108,22 @@ def _told_by_blows(knocks: Knocks, middle: Array, before: float | None) -> Findi
         stops = f"its stops {1e3 * knocks.travel:.0f} mm to either side"
     across = " and ".join(f"{a} = {v:.2f} m" for a, v in zip(AXES, line.at, strict=True) if a != line.axis)
     text = (
-        f"Something slides along {line.axis} and knocks at {stops}: {knocks.blows} blows of one line of "
-        f"action, through {across}, by a part of {with_interval(knocks.mass, knocks.std, 'kg')}. Each "
+        f"Something slides along {_direction(line)} and knocks at {stops}: {knocks.blows} blows of one line "
+        f"of action, through {across}, by a part of {with_interval(knocks.mass, knocks.std, 'kg')}. Each "
         "comes when and as hard as a part would that the one before left at a stop "
         f"({knocks.timed:.0f} nats, of which {knocks.confirmed:.0f} from blows that nothing was fitted to). "
         "The blows themselves are not followed to the noise. Find it by ear, and fix it or take it out."
     )
     where: dict[str, object] = {"channel": None, "axis": line.axis, "position": [float(v) for v in at]}
+    where["direction"] = [float(v) for v in line.along]
     return Finding("loose_mass", where, written(quantities), _evidence(knocks.gain, before), text)
+
+
+def _direction(line: Line) -> str:
+    """A line's direction in words: a body axis where it is one."""
+    if np.max(np.abs(line.along)) > np.cos(ASLANT):
+        return line.axis
+    return "(" + ", ".join(f"{v:.2f}" for v in line.along) + ") of the body"
 
 
 def _told(part: Loose, between: bool, gain: Gain, again: Gain, before: float | None) -> Finding:

@@ -109,7 +109,7 @@ def children(
     first += _alike(standing, first, left, budget, say)
     walked = _walked(problem, standing, first, budget, say)
     if not any(w.rung.alone for w in walked):
-        walked += _unbent(standing, left, promised_here, budget, say)
+        walked += _unbent(problem, standing, left, promised_here, budget, say)
     sense = [s for s in walked if makes_sense(s, problem)]
     absurd = {s.found[-1].kind for s in walked} - {s.found[-1].kind for s in sense}
     behind = [p for p in promises if p.candidate.kind not in absurd] if absurd else []
@@ -139,13 +139,18 @@ def _walked(
         if child.found[-1].kind in explains:
             # The same effect, of which a closer description explains all
             continue
-        say(child.found[-1].label)
-        down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
-        if down is not None:
-            walked.append(replace(child, rung=down))
-            if not leaves_noise(down):
-                walked += _closer(problem, walked[-1], budget, say)
+        walked += _at_own_level(problem, child, budget, say)
     return walked
+
+
+def _at_own_level(problem: Problem, child: Standing, budget: Budget, say: Say) -> list[Standing]:
+    """A first fit walked down to its own level, and closer descriptions of it where it leaves something."""
+    say(child.found[-1].label)
+    down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
+    if down is None:
+        return []
+    walked = replace(child, rung=down)
+    return [walked] if leaves_noise(down) else [walked, *_closer(problem, walked, budget, say)]
 
 
 def _screened(rung: Rung, found: tuple[Candidate, ...], left: list[Candidate], say: Say) -> list[Promise]:
@@ -198,7 +203,12 @@ def _gain(standing: Standing, child: Standing) -> float:
 
 
 def _unbent(
-    standing: Standing, left: list[Candidate], known: list[Promise], budget: Budget, say: Say
+    problem: Problem,
+    standing: Standing,
+    left: list[Candidate],
+    known: list[Promise],
+    budget: Budget,
+    say: Say,
 ) -> list[Standing]:
     """What else is promised where the wrench is strong, walked down from there; nothing beside other effects.
 
@@ -220,9 +230,7 @@ def _unbent(
     if not first:
         return []
     best = max(first, key=lambda child: child.rung.within_reach)
-    say(best.found[-1].label)
-    down = walked_down(best.rung.model, best.rung.evaluation.point, STRONG)
-    return [] if down is None else [replace(best, rung=down)]
+    return _at_own_level(problem, best, budget, say)
 
 
 def _clocks_and_lags(ranked: list[Standing]) -> list[Standing]:
