@@ -11,6 +11,7 @@ told only where it leaves nothing in any run and the catalogue does not come nea
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from rig_identification.estimate.first_guess import extent
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.prediction import model_at
+from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.candidate import Candidate, Told, added
 from rig_identification.mismatch.findings import written
 from rig_identification.mismatch.place_scan import Scales, direction, followed, point_near_middle
@@ -42,6 +44,8 @@ NARROWS = (0.0, 0.5, 2.0)
 #: How early a brake saturates: squares of the largest speed in parts of that at which it pulls most. A magnet
 #: over copper does so at some cm/s, dry friction at once.
 EARLY = (3.0, 30.0)
+#: Factor between what is tried from a fit.
+SHARPER = 30.0
 #: How far a brake counts the vertical at first: between not at all, 0, and like any other direction, 1.
 UPRIGHT = 0.5
 #: Std of a line's angles, rad.
@@ -93,7 +97,27 @@ def brake_law(rig: Rig, scales: Scales, early: float = 0.0) -> Candidate:
         )
     # The vertical part may count like any other, or not at all
     upright = added("unknown.upright", "1", 0.5, block + place.LAW_UPRIGHT, UPRIGHT)
-    return _law((*amounts, bent, upright, *_point(rig, scales)), 1)
+    law = _law((*amounts, bent, upright, *_point(rig, scales)), 1)
+    return replace(law, between=partial(_sharper, rig, scales, early)) if early > 0.0 else law
+
+
+def _sharper(
+    rig: Rig, scales: Scales, early: float, problem: Problem, evaluation: Evaluation
+) -> list[tuple[Candidate, dict[str, float]]]:
+    """A fitted brake that saturates so ``early`` as one that does so earlier, and pulls as hard then.
+
+    Dry friction saturates at once. Between the two lies a valley: as it saturates earlier, a brake that pulls
+    most at some speed first loses what it explains there.
+    """
+    values = problem.bench.parameters.named(evaluation.point.theta)
+    law = brake_law(rig, scales, SHARPER * early)
+    start = {q.name: values[q.name] for q in law.parameters if q.name in values}
+    if len(start) < len(law.parameters):
+        return []
+    start["unknown.saturation"] *= SHARPER
+    start["unknown.quadratic_damping"] *= SHARPER
+    start["unknown.damping"] *= SHARPER**0.5
+    return [(law, start)]
 
 
 def _law(parameters: tuple[Parameter, ...], positive: int) -> Candidate:

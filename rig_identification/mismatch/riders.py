@@ -50,6 +50,7 @@ class Swing:
     frequency: float  # Hz, the lowest
     along: tuple[float, ...] = ()  # Hz, of each axis where they differ
     turning: tuple[tuple[str, float], ...] = ()  # axes that it turns about as well, and Hz about each
+    tilted: bool = False  # whether its one line lies between axes
 
     @property
     def effect(self) -> str:
@@ -108,6 +109,51 @@ def _ringing_like(
         return (sinking,)
     stretching = cable_elasticity(rig, model, mass)
     return sinking, (stretching, {STIFFNESS: yielding_like(rig, model, compliance)})
+
+
+def tilt(effect: str, axis: str, first: int) -> tuple[Parameter, ...]:
+    """How far the line of a part that moves along ``axis`` leans towards the other two, in parts of that.
+
+    first: entry of the rider's block. Its travel is along (1, u, v), whose length L = (1 + u^2 + v^2)^1/2 is
+    not one: of a travel q it goes L q, so that it swings at 1/L of its frequency's number, damped by L times
+    its damping's (:func:`_along_line`).
+    """
+    return tuple(
+        Parameter(f"{effect}.direction.{a}", "1", 0.0, 1.0, "physics", first + layout.AXIS + i, bounded=False)
+        for i, a in enumerate(AXES)
+        if a != axis
+    )
+
+
+def lean(values: dict[str, float], effect: str) -> float:
+    """Length of a line's direction, as :func:`tilt` has it. values: with its numbers, or without."""
+    return float(np.sqrt(1.0 + sum(values.get(f"{effect}.direction.{a}", 0.0) ** 2 for a in AXES)))
+
+
+def _along_line(found: Estimates, effect: str, axis: str) -> Told:
+    """Frequency, damping and direction of a part whose line leans."""
+    names = [f"{effect}.direction.{a}" for a in AXES if a != axis]
+
+    def long(u: float, v: float) -> float:
+        return float(np.sqrt(1.0 + u * u + v * v))
+
+    out: Told = {
+        "frequency": (
+            *found.following(lambda f, u, v: f / long(u, v), f"{effect}.frequency", *names),
+            "Hz",
+        ),
+        "damping_ratio": (
+            *found.following(lambda z, u, v: z * long(u, v), f"{effect}.damping_ratio", *names),
+            "1",
+        ),
+        f"direction_{axis}": (*found.following(lambda u, v: 1.0 / long(u, v), *names), "1"),
+    }
+    for k, a in enumerate(a for a in AXES if a != axis):
+        out[f"direction_{a}"] = (
+            *found.following(lambda u, v, k=k: (u, v)[k] / long(u, v), *names),
+            "1",
+        )
+    return out
 
 
 def _turning(
@@ -189,6 +235,7 @@ def rider_candidate(
                 for k, (name, nominal) in enumerate(frequencies.items())
             ),
             number("damping_ratio", "1", DAMPING, 1.0, layout.DAMPING_RATIO, True),
+            *(tilt(effect, axes[0], o) if swing.tilted else ()),
         )
         return model.with_internal(np.concatenate([blocks, turns])), parameters + its_own
 
@@ -198,12 +245,14 @@ def rider_candidate(
         if swing.along:
             out["frequency"] = min(swings.values())
         out |= swings | {"damping_ratio": (*found.of(f"{effect}.damping_ratio"), "1")}
+        if swing.tilted:
+            out |= _along_line(found, effect, axes[0])
         for a, _ in swing.turning:
             out[f"inertia_{a}"] = (*found.of(f"{effect}.inertia.{a}"), "kg m^2")
             out[f"turning_frequency_{a}"] = (*found.of(f"{effect}.turning_frequency.{a}"), "Hz")
         return out | {f"position_{a}": (*found.of(f"{effect}.position.{a}"), "m") for a in AXES}
 
-    ways = ", ".join(axes)
+    ways = f"a line near {axes[0]}" if swing.tilted else ", ".join(axes)
     if swing.turning:
         ways += f" and turns about {', '.join(a for a, _ in swing.turning)}"
     thing, advice = {
@@ -221,12 +270,12 @@ def rider_candidate(
         build(problem.bench.parameters.model)[1],
         f"{thing} {{value}} of it.",
         advice,
-        {"channel": None, "axis": swing.directions if len(axes) == 1 else None},
+        {"channel": None, "axis": swing.directions if len(axes) == 1 and not swing.tilted else None},
         positive=1,
         tell=told,
         build=build,
         ordinary={f"{effect}.mass": LIGHT * mass},
-        twins=() if len(axes) > 1 or swing.turning else _ringing_like(problem, swing, mass),
+        twins=() if len(axes) > 1 or swing.turning or swing.tilted else _ringing_like(problem, swing, mass),
     )
     values = {f"{effect}.mass": found}
     values |= {f"{effect}.position.{a}": float(at[i]) for i, a in enumerate(AXES)}

@@ -41,8 +41,10 @@ from rig_identification.mismatch.riders import (
     NUMBERS,
     SWINGS,
     Swing,
+    lean,
     middle_of,
     rider_candidate,
+    tilt,
 )
 from rig_identification.mismatch.supports import (
     cable_elasticity,
@@ -54,6 +56,7 @@ from rig_identification.mismatch.supports import (
     yielding_like,
 )
 from rig_identification.mismatch.tethers import placed_tethers
+from rig_identification.model import layout
 from rig_identification.model.motion import State
 
 Array = NDArray[np.float64]
@@ -66,6 +69,8 @@ COARSE = 0.5
 KEPT = 0.5
 #: Share of what is promised that first order is right within.
 AS_MUCH = 0.5
+#: How far a line may lean where it is fitted first, of its own axis' part: to first order it knows no end.
+LEANING = 1.0
 #: Share of the best promise of an effect that another one of the same has to come to, to be fitted as well.
 ELSEWHERE = 0.8
 
@@ -339,7 +344,7 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
         gain -= _unearned(problem, beyond, found.columns, found.weights, runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
-    more = _more_ways if found.swing.effect == "sprung_mass" else _on_springs
+    more = further_ways if found.swing.effect == "sprung_mass" else springs_instead
     candidate = replace(candidate, between=partial(more, found.swing, mass))
     for (a, _), inertia in zip(found.swing.turning, best.amounts[1:], strict=True):
         values[f"{found.swing.effect}.inertia.{a}"] = float(inertia)
@@ -347,16 +352,22 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
     return Promise(candidate, gain, values | {f"{found.swing.effect}.damping_ratio": found.damping})
 
 
-def _more_ways(
+def further_ways(
     swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
 ) -> list[tuple[Candidate, dict[str, float]]]:
-    """A fitted part on springs, moving along further axes, or turning; what promises more comes first.
+    """A fitted part on springs, moving along further axes or a line between them, or turning.
 
-    mass: kg, of the body. One that promises less than a half of the other is not asked before the other.
+    What promises more comes first.
+
+    mass: kg, of the body. One that promises less than a half of the other is not asked before the other, but
+    for a line: how far it leans first order knows least of all.
     """
     effect, known = swing.effect, swing.directions
     values = problem.bench.parameters.named(evaluation.point.theta)
-    opened = opened_with(problem, evaluation, []) if values[f"{effect}.mass"] > 0.0 else None
+    first = next(q.index for q in problem.bench.parameters.free if q.name == f"{effect}.mass") - layout.MASS
+    leaning = Candidate(effect, tilt(effect, known, first), "", "", {})
+    tilts = [leaning] if len(known) == 1 and not swing.tilted else []
+    opened = opened_with(problem, evaluation, tilts) if values[f"{effect}.mass"] > 0.0 else None
     if opened is None:
         return []
     amount, at = values[f"{effect}.mass"], np.array([values[f"{effect}.position.{a}"] for a in AXES])
@@ -364,7 +375,14 @@ def _more_ways(
     turning = {a: values[f"{effect}.turning_frequency.{a}"] for a, _ in swing.turning}
     damping = values[f"{effect}.damping_ratio"]
     asked: list[tuple[float, Swing, dict[str, float]]] = []
-    ways = other_ways(problem, opened[1], known, amount, at)
+    for promise in (promise_of(*opened, c) for c in tilts):
+        leans = {name: float(np.clip(v, -LEANING, LEANING)) for name, v in promise.values.items()}
+        length = lean(leans, effect)
+        own = {f"{effect}.frequency": have[known] * length, f"{effect}.damping_ratio": damping / length}
+        moving = replace(swing, turning=tuple(turning.items()), tilted=True)
+        asked.append((promise.gain, moving, leans | own))
+    # Along a line between axes it moves along all of them
+    ways = {} if swing.tilted else other_ways(problem, opened[1], known, amount, at)
     if ways:
         frequencies = {a: ways[a][0] if a in ways else have[a] for a in AXES if a in ways or a in have}
         along = tuple(frequencies.values())
@@ -384,16 +402,16 @@ def _more_ways(
     kept = {q.name: values[q.name] for q in problem.bench.parameters.free if q.name.startswith(f"{effect}.")}
     out = []
     for gain, moving, own in sorted(asked, key=lambda a: -a[0]):
-        if gain >= AS_MUCH * most:
+        if gain >= AS_MUCH * most or (moving.tilted and not swing.tilted):
             candidate, start = rider_candidate(problem, moving, mass, amount, at)
-            candidate = replace(candidate, between=partial(_more_ways, moving, mass))
+            candidate = replace(candidate, between=partial(further_ways, moving, mass))
             names = {q.name for q in candidate.parameters}
             start |= {name: value for name, value in kept.items() if name in names}
             out.append((candidate, start | own))
     return out
 
 
-def _on_springs(
+def springs_instead(
     swing: Swing, mass: float, problem: Problem, evaluation: Evaluation
 ) -> list[tuple[Candidate, dict[str, float]]]:
     """A fitted liquid as a part on springs, along the vertical too where that explains some.
@@ -412,7 +430,7 @@ def _on_springs(
     moving = Swing("".join(along), min(along.values()), tuple(along.values()))
     candidate, start = rider_candidate(problem, moving, mass, amount, at)
     damping = values[f"{swing.effect}.damping_ratio"]
-    candidate = replace(candidate, between=partial(_more_ways, moving, mass))
+    candidate = replace(candidate, between=partial(further_ways, moving, mass))
     return [(candidate, start | {f"{moving.effect}.damping_ratio": damping})]
 
 

@@ -27,7 +27,7 @@ from scipy.stats import norm
 
 from rig_identification.errors import InputError
 from rig_identification.estimate.identify import runs_of
-from rig_identification.estimate.parameters import INERTIAL
+from rig_identification.estimate.parameters import AXES, INERTIAL
 from rig_identification.estimate.prediction import linearise_run, model_at
 from rig_identification.estimate.rest_evidence import linearise_rest, prepare_rest, with_dummy
 from rig_identification.estimate.side_by_side import side_by_side
@@ -253,14 +253,21 @@ def _candidate(problem: Problem, lab: Laboratory, stated: Stated) -> Candidate |
 
 
 def _riders(problem: Problem, stated: Stated, mass: float) -> list[Candidate]:
-    """A liquid or a part on springs along one axis, as stated."""
-    frequency = stated.numbers.get(f"{stated.effect}.frequency")
-    if frequency is None or stated.effect not in ("liquid_slosh", "sprung_mass"):
+    """A liquid or a part on springs, along one axis, several, or a line between, as stated."""
+    if stated.effect not in ("liquid_slosh", "sprung_mass"):
         return []
-    swings = [Swing(directions, frequency[0]) for directions in DIRECTIONS]
-    ways = [
-        s for s in swings if s.effect == stated.effect and stated.where.get("axis") in (None, s.directions)
-    ]
+    numbers, effect = stated.numbers, stated.effect
+    along = {a: numbers[f"{effect}.frequency.{a}"][0] for a in AXES if f"{effect}.frequency.{a}" in numbers}
+    frequency = numbers.get(f"{effect}.frequency")
+    swings: list[Swing] = []
+    if along:
+        swings.append(Swing("".join(along), min(along.values()), tuple(along.values())))
+    elif frequency is not None:
+        leans = any(name.startswith(f"{effect}.direction.") for name in numbers)
+        lines = AXES if leans else tuple(DIRECTIONS)
+        swings += [Swing(directions, frequency[0], tilted=leans) for directions in lines]
+    axis = stated.where.get("axis")
+    ways = [s for s in swings if s.effect == effect and axis in (None, s.directions)]
     return [rider_candidate(problem, s, mass, 0.0, np.zeros(3))[0] for s in ways]
 
 

@@ -133,7 +133,7 @@ def _walked(
         if walked and budget.spent():
             budget.leave(c.found[-1].label for c in first[k:WALKED])
             break
-        explains = [w.found[-1].kind for w in walked if w.rung.alone]
+        explains = [w.found[-1].kind for w in walked if w.rung.alone and makes_sense(w, problem)]
         if explains and _gain(standing, child) < REACHED * _gain(standing, first[0]):
             break
         if child.found[-1].kind in explains:
@@ -144,13 +144,19 @@ def _walked(
 
 
 def _at_own_level(problem: Problem, child: Standing, budget: Budget, say: Say) -> list[Standing]:
-    """A first fit walked down to its own level, and closer descriptions of it where it leaves something."""
+    """A first fit walked down to its own level, and closer descriptions of it where it leaves something.
+
+    Or where it leaves nothing and makes no sense: a line between two axes is taken for a part too heavy along
+    one of them.
+    """
     say(child.found[-1].label)
     down = walked_down(child.rung.model, child.rung.evaluation.point, child.rung.level)
     if down is None:
         return []
     walked = replace(child, rung=down)
-    return [walked] if leaves_noise(down) else [walked, *_closer(problem, walked, budget, say)]
+    if leaves_noise(down) and makes_sense(walked, problem):
+        return [walked]
+    return [walked, *_closer(problem, walked, budget, say)]
 
 
 def _screened(rung: Rung, found: tuple[Candidate, ...], left: list[Candidate], say: Say) -> list[Promise]:
