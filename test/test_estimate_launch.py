@@ -14,8 +14,8 @@ from rig_identification.estimate.identify import fit_session, pose_problem
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.prediction import model_at
 from rig_identification.estimate.whole import predicted
+from rig_identification.mismatch.opened import extended
 from rig_identification.mismatch.riders import Swing, rider_candidate
-from rig_identification.mismatch.screen import extended
 from rig_identification.mismatch.supports import cable_elasticity
 from rig_identification.model.equilibrium import find_rest
 from rig_identification.model.motion import rig_model

@@ -14,7 +14,7 @@ from rig_identification.estimate.first_guess import rest_of
 from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.mounting import Answer, mounted, mounted_change
 from rig_identification.estimate.prediction import linearise_run, model_at
-from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.opened import extended
 from rig_identification.mismatch.soft_mount import soft_mounts
 
 STEP = 0.01

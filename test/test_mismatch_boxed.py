@@ -13,7 +13,8 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.opened import Promise, with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import Trial, fitted_to_its_end, mass_of
 from rig_identification.recording import Session
 from rig_identification.simulate import simulate_session

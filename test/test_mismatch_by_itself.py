@@ -17,7 +17,8 @@ from rig_identification.mismatch.by_itself import each_by_itself, not_weighed
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import carried, extended, screen, with_reference
+from rig_identification.mismatch.opened import carried, extended, with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import Trial, is_ordinary, mass_of, may_be_none, ordinary_amount
 from rig_identification.mismatch.whole_runs import Named, as_fitted, fitted_whole, ordinary_alone, pruned
 from rig_identification.recording import Recording

@@ -12,7 +12,7 @@ from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import catalogue, compatible
-from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.opened import extended
 from rig_identification.simulate import simulate_session
 
 

@@ -11,9 +11,9 @@ from rig_identification.estimate.estimates import estimates
 from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import solve
+from rig_identification.mismatch.opened import carried, extended, with_reference
 from rig_identification.mismatch.place_scan import scales_of
 from rig_identification.mismatch.point_laws import brake_law
-from rig_identification.mismatch.screen import carried, extended, with_reference
 from rig_identification.mismatch.trial import log_evidence, mass_of, promised
 from rig_identification.simulate import simulate_session
 

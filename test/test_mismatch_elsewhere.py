@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rig_identification.mismatch.screen import ELSEWHERE, _peaks
+from rig_identification.mismatch.rider_promises import ELSEWHERE, _peaks
 
 
 @pytest.mark.parametrize(

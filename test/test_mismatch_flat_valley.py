@@ -12,7 +12,7 @@ from rig_identification.estimate.growing import misfit
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem, still_promised
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.opened import Promise, with_reference
 from rig_identification.mismatch.trial import attempt
 from rig_identification.simulate import simulate_session
 

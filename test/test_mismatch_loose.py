@@ -15,7 +15,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import fit_session
 from rig_identification.mismatch.loose import Along, Loose
 from rig_identification.mismatch.measured import measured
-from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.opened import with_reference
 from rig_identification.mismatch.something_loose import loose_finding
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.model import layout

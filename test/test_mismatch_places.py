@@ -10,8 +10,9 @@ from test_simulate_identify import seen_by_the_true_body, shaken
 
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
 from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.opened import Promise, carried, extended
 from rig_identification.mismatch.places import TERMS, best_place, crossed, design, monomials
-from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import Trial, in_reach, mass_of, possible
 
 

@@ -12,7 +12,7 @@ from test_model_rigs import thesis_case_14
 from wrong_sessions import made
 
 from rig_identification.estimate.identify import pose_problem
-from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.opened import extended
 from rig_identification.mismatch.shared_errors import ALL, shared_errors
 from rig_identification.model import layout
 from rig_identification.recording import Recording, Session

@@ -13,7 +13,8 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import screen, with_reference
+from rig_identification.mismatch.opened import with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import fitted_to_its_end, mass_of
 from rig_identification.recording import Recording
 from rig_identification.search.expand import Standing, _alike, special_cases

@@ -14,7 +14,8 @@ from rig_identification.estimate.identify import fit_session, near_noise
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.hypotheses import catalogue, count_of
-from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.opened import Promise, with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.recording import Session
 from rig_identification.search.expand import Standing, children, worthy

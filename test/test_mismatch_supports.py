@@ -16,7 +16,7 @@ from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.estimate.verdict import weighed_otherwise
 from rig_identification.mismatch.amounts import supports
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.opened import Promise, with_reference
 from rig_identification.mismatch.supports import cable_elasticity
 from rig_identification.mismatch.trial import VERY_FAR, attempt, mass_of
 from rig_identification.recording import Series, Session

@@ -20,7 +20,7 @@ from rig_identification.estimate.whole import predicted
 from rig_identification.mismatch.budget import UNLIMITED
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.opened import extended
 from rig_identification.mismatch.swing_effects import Choice
 from rig_identification.mismatch.swing_near_noise import near_noise_models
 from rig_identification.mismatch.swing_whole import Whole, likeliest

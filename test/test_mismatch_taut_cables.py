@@ -10,7 +10,8 @@ from test_simulate_identify import shaken
 
 from rig_identification.estimate.identify import fit_session
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import screen, with_reference
+from rig_identification.mismatch.opened import with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.supports import TAUT, taut_cables
 from rig_identification.mismatch.trial import attempt, mass_of
 from rig_identification.model import layout

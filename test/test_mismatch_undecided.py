@@ -11,7 +11,8 @@ from test_simulate_identify import shaken
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import evaluate
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import carried, extended, screen, with_reference
+from rig_identification.mismatch.opened import carried, extended, with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import log_evidence, mass_of
 from rig_identification.mismatch.undecided import shared_by_places
 from rig_identification.result import Identification

@@ -14,7 +14,7 @@ from rig_identification.api.planning import earlier
 from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import Problem, solve
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.opened import carried, extended
 from rig_identification.plan import Before, Known, Means, Plan, Stated, plan, planning
 from rig_identification.plan.apart import DECIDED, SURE, Side, Tie, Told, deciding, needed, ties_of
 from rig_identification.plan.information import Laboratory, laboratory

@@ -18,14 +18,9 @@ from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
+from rig_identification.mismatch.opened import carried, extended, with_reference
+from rig_identification.mismatch.rider_promises import further_ways, springs_instead
 from rig_identification.mismatch.riders import Swing, lean, rider_candidate
-from rig_identification.mismatch.screen import (
-    carried,
-    extended,
-    further_ways,
-    springs_instead,
-    with_reference,
-)
 from rig_identification.mismatch.trial import promised
 from rig_identification.model import layout
 from rig_identification.model.effects import place

@@ -9,7 +9,7 @@ import pytest
 
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import MANY, Candidate, added
-from rig_identification.mismatch.screen import Promise
+from rig_identification.mismatch.opened import Promise
 from rig_identification.model import work
 from rig_identification.search import expand
 from rig_identification.search import search as queue

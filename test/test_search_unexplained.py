@@ -27,11 +27,13 @@ def partly(
     left: float = 1.2,
     weaker: int = WEAKER,
     contradicted: bool = False,
+    held_out: float | None = 1.4,
     named: bool = True,
 ) -> bool:
     """Whether names are told that leave so much, and make the wrench weaker by so many levels."""
     monkeypatch.setattr(unexplained, "misfit", lambda evaluation: left)
     monkeypatch.setattr(unexplained, "hear", lambda fitted: SimpleNamespace(contradicted=contradicted))
+    monkeypatch.setattr(unexplained, "judged", lambda fitted: (SimpleNamespace(holdout=held_out), None))
     told = SimpleNamespace(findings=("named",) if named else ())
     found = SimpleNamespace(possible=possible, fitted=SimpleNamespace(evaluation=None), mismatch=told)
     first, likeliest = (SimpleNamespace(rung=SimpleNamespace(level=level)) for level in (1, 1 + weaker))
@@ -47,6 +49,9 @@ def test_names_are_told_beside_which_next_to_nothing_is(monkeypatch: pytest.Monk
     # They bend to what is none of them: the wrench stays
     assert not partly(monkeypatch, weaker=WEAKER - 1)
     assert not partly(monkeypatch, contradicted=True)
+    assert not partly(monkeypatch, contradicted=True, held_out=None)
+    # A run moves sharp numbers by some std, and is predicted all the same
+    assert partly(monkeypatch, contradicted=True, held_out=1.01)
     # Less than nothing of an amount, or none
     assert not partly(monkeypatch, possible=False)
     assert not partly(monkeypatch, named=False)

@@ -12,7 +12,7 @@ from rig_identification.estimate.identify import fit_session, pose_problem
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate
-from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.opened import with_reference
 from rig_identification.recording import Session
 from rig_identification.result import ELEMENTS, InertialEstimate
 from rig_identification.simulate import (

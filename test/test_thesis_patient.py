@@ -9,7 +9,7 @@ from rig_identification.estimate.identify import pose_problem
 from rig_identification.estimate.launch import Launch
 from rig_identification.estimate.solve import evaluate
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.opened import carried, extended
 from rig_identification.result import Finding
 from rig_identification.simulate import simulate_session
 from rig_identification.thesis import load_case

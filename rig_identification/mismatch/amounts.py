@@ -18,7 +18,8 @@ from rig_identification.estimate.solve import Evaluation, Problem, evaluate, exc
 from rig_identification.estimate.stretching import usual_stiffness
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.screen import ELSEWHERE, Promise, carried, extended
+from rig_identification.mismatch.opened import Promise, carried, extended
+from rig_identification.mismatch.rider_promises import ELSEWHERE
 from rig_identification.mismatch.supports import (
     CEILING_FREQUENCY,
     cable_elasticity,

@@ -18,7 +18,7 @@ from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import scores
 from rig_identification.estimate.whole import fit_whole
 from rig_identification.mismatch.explained import Explained
-from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.opened import carried, extended
 from rig_identification.mismatch.trial import Trial, may_be_none
 from rig_identification.mismatch.whole_runs import as_fitted
 from rig_identification.result import Finding

@@ -30,7 +30,7 @@ from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.beyond import Beyond, Columns
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.change import Change, Group, within
-from rig_identification.mismatch.screen import Promise, opened_with, promise_of
+from rig_identification.mismatch.opened import Promise, opened_with, promise_of
 from rig_identification.model import layout
 from rig_identification.model.body import linear_in_log_cholesky
 from rig_identification.model.definite import definite

@@ -19,9 +19,9 @@ from rig_identification.mismatch.lagging_cells import lagging_cells
 from rig_identification.mismatch.left_out_physics import left_out_physics
 from rig_identification.mismatch.locate import devices_of
 from rig_identification.mismatch.mount_errors import mount_errors
+from rig_identification.mismatch.opened import Promise
 from rig_identification.mismatch.riders import SWINGS
 from rig_identification.mismatch.rig_errors import rig_errors
-from rig_identification.mismatch.screen import Promise
 from rig_identification.mismatch.sensor_errors import sensor_errors
 from rig_identification.mismatch.shared_errors import shared_errors
 from rig_identification.mismatch.soft_mount import soft_mounts

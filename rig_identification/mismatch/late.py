@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.in_motion import cost_in_motion
-from rig_identification.mismatch.screen import Promise
+from rig_identification.mismatch.opened import Promise
 
 if TYPE_CHECKING:
     from rig_identification.mismatch.trial import Trial

@@ -28,9 +28,9 @@ from rig_identification.estimate.parameters import AXES
 from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.mismatch.beyond import Beyond
+from rig_identification.mismatch.opened import free_without
 from rig_identification.mismatch.response import instant_information, whitened_response
 from rig_identification.mismatch.rider_places import REACH
-from rig_identification.mismatch.screen import free_without
 from rig_identification.model import layout
 from rig_identification.model.motion import Motion
 

@@ -18,10 +18,10 @@ from rig_identification.estimate.parameters import AXES, Parameter
 from rig_identification.estimate.solve import Evaluation, Problem, excess
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.candidate import Candidate, added
+from rig_identification.mismatch.opened import Promise, free_without
 from rig_identification.mismatch.places import travel_of
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
-from rig_identification.mismatch.screen import Promise, free_without
 from rig_identification.model import layout
 from rig_identification.model.motion import Motion, RigModel
 from rig_identification.rig import Rig

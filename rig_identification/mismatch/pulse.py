@@ -25,9 +25,9 @@ from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Evaluation, Point, Problem, evaluate
 from rig_identification.mismatch.beyond import Beyond
 from rig_identification.mismatch.findings import pushed
+from rig_identification.mismatch.opened import free_without, with_reference
 from rig_identification.mismatch.response import whitened_response
 from rig_identification.mismatch.riders import middle_of
-from rig_identification.mismatch.screen import free_without, with_reference
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.result import Finding
 

@@ -17,10 +17,11 @@ from rig_identification.mismatch.hypotheses import catalogue
 from rig_identification.mismatch.knocks import Knocks, Line, knocking
 from rig_identification.mismatch.loose import FARTHEST, LIKELY, Along, Gain, Loose, likeliest
 from rig_identification.mismatch.measured import measured
+from rig_identification.mismatch.opened import with_reference
 from rig_identification.mismatch.rider_places import spread_of
 from rig_identification.mismatch.riders import middle_of
 from rig_identification.mismatch.ringing import without_ringing
-from rig_identification.mismatch.screen import screen, with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import mass_of
 from rig_identification.quantity import with_interval
 from rig_identification.result import Finding

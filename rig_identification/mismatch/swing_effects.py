@@ -21,7 +21,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import rival
 from rig_identification.mismatch.hypotheses import needed_gain
-from rig_identification.mismatch.screen import carried, extended, free_without
+from rig_identification.mismatch.opened import carried, extended, free_without
 from rig_identification.mismatch.subsets import best_subset, gains_alone
 from rig_identification.mismatch.trial import Trial, finished, log_evidence
 

@@ -40,7 +40,7 @@ from rig_identification.estimate.swing_period import long_enough
 from rig_identification.estimate.unseen_swing import CALM
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.screen import extended
+from rig_identification.mismatch.opened import extended
 from rig_identification.mismatch.swing_effects import (
     DAMPERS,
     Choice,

@@ -22,7 +22,7 @@ from rig_identification.estimate.parameters import INERTIAL
 from rig_identification.estimate.solve import POLISH, Evaluation, Point, Problem, evaluate, solve
 from rig_identification.mismatch.budget import UNLIMITED, Budget
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.screen import Promise, carried, extended
+from rig_identification.mismatch.opened import Promise, carried, extended
 from rig_identification.model.definite import definite
 
 Array = NDArray[np.float64]

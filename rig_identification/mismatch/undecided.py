@@ -29,7 +29,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import called, rival
-from rig_identification.mismatch.screen import Promise
+from rig_identification.mismatch.opened import Promise
 from rig_identification.mismatch.trial import (
     Trial,
     beyond_doubt,

@@ -28,7 +28,7 @@ from rig_identification.mismatch.explained import evidence_of
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hands import hand_finding, nobody_held
 from rig_identification.mismatch.left_out_physics import left_out_physics
-from rig_identification.mismatch.screen import with_reference
+from rig_identification.mismatch.opened import with_reference
 from rig_identification.mismatch.swing_effects import DAMPERS, STEPS, Choice, Notify, damped, exchanged
 from rig_identification.mismatch.swing_near_noise import models_of_one_turn, near_noise_models
 from rig_identification.mismatch.swing_whole import Predicted, Whole, likeliest

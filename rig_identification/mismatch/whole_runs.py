@@ -18,7 +18,7 @@ from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, trace_of
 from rig_identification.mismatch.findings import effects_of, finding
 from rig_identification.mismatch.hypotheses import needed_gain
-from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.opened import carried, extended
 from rig_identification.mismatch.trial import (
     Trial,
     beyond_doubt,

@@ -34,8 +34,8 @@ from rig_identification.estimate.side_by_side import side_by_side
 from rig_identification.estimate.solve import Point, Problem, evaluate
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import catalogue
+from rig_identification.mismatch.opened import extended, with_reference
 from rig_identification.mismatch.riders import DIRECTIONS, Swing, rider_candidate
-from rig_identification.mismatch.screen import extended, with_reference
 from rig_identification.mismatch.supports import cable_elasticity, ceiling_candidate, gives_way
 from rig_identification.plan.before import Before, Stated
 from rig_identification.plan.information import LEFT_AT_REST, Laboratory, recorded

@@ -33,7 +33,7 @@ from rig_identification.estimate.verdict import DOUBTED
 from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.findings import called
 from rig_identification.mismatch.hypotheses import catalogue, count_of, needed_gain
-from rig_identification.mismatch.screen import adding, carried, with_reference
+from rig_identification.mismatch.opened import adding, carried, with_reference
 from rig_identification.mismatch.supports import ceiling_candidate, gives_way
 from rig_identification.mismatch.undecided import STATED, TIED, shared_by_places
 from rig_identification.plan.choose import Choice

@@ -27,8 +27,9 @@ from rig_identification.mismatch.changes import changeable, likeliest_changes, r
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors, trace_of
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
+from rig_identification.mismatch.opened import Promise, adding, carried, extended
 from rig_identification.mismatch.pulse import all_runs
-from rig_identification.mismatch.screen import Promise, adding, carried, extended, screen
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import Trial, log_evidence, mass_of
 from rig_identification.model.definite import definite
 from rig_identification.result import Finding, Mismatch

@@ -10,7 +10,7 @@ from __future__ import annotations
 from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.hypotheses import compatible
-from rig_identification.mismatch.screen import Promise
+from rig_identification.mismatch.opened import Promise
 from rig_identification.search.expand import Say, Standing, begun_with, earned, makes_sense
 from rig_identification.search.ladder import walked_down
 

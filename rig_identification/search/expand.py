@@ -20,8 +20,9 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.hypotheses import compatible, count_of, net_gain, stood_for
 from rig_identification.mismatch.in_motion import unearned
 from rig_identification.mismatch.late import lag_like, told_apart
+from rig_identification.mismatch.opened import Promise, carried, extended
 from rig_identification.mismatch.same_clock import contradicted
-from rig_identification.mismatch.screen import Promise, carried, extended, screen
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.supports import TAUT, cable_elasticity, gives_way, stiffnesses, taut_cables
 from rig_identification.mismatch.trial import (
     Trial,

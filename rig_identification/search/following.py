@@ -34,8 +34,8 @@ from rig_identification.estimate.prediction import Linearised
 from rig_identification.estimate.solve import Evaluation, Problem
 from rig_identification.estimate.sources import with_sources
 from rig_identification.mismatch.beyond import Beyond
+from rig_identification.mismatch.opened import free_without
 from rig_identification.mismatch.response import whitened_response
-from rig_identification.mismatch.screen import free_without
 from rig_identification.model import layout
 from rig_identification.result import ELEMENTS, InertialEstimate
 

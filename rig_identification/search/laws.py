@@ -14,10 +14,10 @@ from rig_identification.mismatch.candidate import Candidate
 from rig_identification.mismatch.carried_air import CARRIED_NAME, CarriedAir
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.findings import effects_of
+from rig_identification.mismatch.opened import Promise, carried, extended
 from rig_identification.mismatch.place_scan import Shape, best_places
 from rig_identification.mismatch.plates import AREA_NAME, PLATES
 from rig_identification.mismatch.point_laws import LAWS, law_finding, parts_of, sparser
-from rig_identification.mismatch.screen import Promise, carried, extended
 from rig_identification.mismatch.trial import LAST_STEPS, Trial, in_stds, log_evidence, mass_of
 from rig_identification.search.ladder import Rung
 

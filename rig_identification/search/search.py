@@ -16,7 +16,7 @@ from rig_identification.estimate.solve import Problem
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained
 from rig_identification.mismatch.hypotheses import catalogue
-from rig_identification.mismatch.screen import Promise, with_reference
+from rig_identification.mismatch.opened import Promise, with_reference
 from rig_identification.mismatch.whole_runs import Heard, unheard
 from rig_identification.search.crossed import crossed, siblings
 from rig_identification.search.expand import MEANT, Standing, children, described_closer

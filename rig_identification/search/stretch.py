@@ -16,7 +16,7 @@ import numpy as np
 
 from rig_identification.estimate.evidence import MARGIN, WIDE_NODE_STEP, Run
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.screen import carried, extended
+from rig_identification.mismatch.opened import carried, extended
 from rig_identification.search.ladder import PASSING, STAYING, Rung, fitted_at
 from rig_identification.search.path import beside
 

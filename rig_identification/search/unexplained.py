@@ -32,6 +32,8 @@ Notify = Callable[[str, float], None]
 WEAKER = 2
 #: Mean square of whole runs' residuals beyond which names are refuted.
 WRONG = 3.0
+#: Held-out error up to which a model predicts as one that explains (recording contract).
+PREDICTS = 1.1
 #: Level at which the wrench is found where the evidence asks for none: what is left lies in the sensors.
 STAND_IN = ALONE - 4
 
@@ -102,8 +104,13 @@ def _partly(outcome: Outcome) -> Explained | None:
         return None
     if misfit(best.fitted.evaluation) > WRONG:
         return None
-    weaker = outcome.likeliest.rung.level - first.level
-    return best if weaker >= WEAKER and not hear(best.fitted).contradicted else None
+    if outcome.likeliest.rung.level - first.level < WEAKER:
+        return None
+    if not hear(best.fitted).contradicted:
+        return best
+    # Sharp numbers that another run moves by some std are no other physics where they predict that run
+    held_out = judged(best.fitted)[0].holdout
+    return best if held_out is not None and held_out < PREDICTS else None
 
 
 def _bases(

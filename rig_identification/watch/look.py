@@ -21,7 +21,8 @@ from rig_identification.estimate.observability import inertial_estimate
 from rig_identification.estimate.solve import CannotBeFollowed, Point, Problem, solve
 from rig_identification.mismatch.findings import finding
 from rig_identification.mismatch.hypotheses import catalogue, count_of, net_gain
-from rig_identification.mismatch.screen import Promise, screen, with_reference
+from rig_identification.mismatch.opened import Promise, with_reference
+from rig_identification.mismatch.screen import screen
 from rig_identification.mismatch.trial import Trial, attempt, log_evidence, mass_of
 from rig_identification.recording import Session
 from rig_identification.result import Finding, InertialEstimate
