@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -13,6 +15,7 @@ from rig_identification.estimate.sampling import interpolation
 from rig_identification.estimate.solve import Problem
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import likeliest_sway
+from rig_identification.estimate.wander import likeliest_moves, moves_at
 from rig_identification.result import BodyMotion, ChannelFit
 
 Array = NDArray[np.float64]
@@ -29,7 +32,8 @@ def node_corrections(linearised: Linearised) -> Array | None:
 
 def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -> list[ChannelFit]:
     """One :class:`ChannelFit` an axis of each channel of a run, sample by sample."""
-    corrections = node_corrections(linearised)
+    moved = _moved(problem, run, linearised)
+    corrections = node_corrections(_beside(run, linearised, moved))
     parameters = problem.bench.of(run).parameters
     places, own = parameters.places, parameters.device(theta)
     fits = []
@@ -45,6 +49,8 @@ def run_fits(problem: Problem, run: Run, linearised: Linearised, theta: Array) -
         each = np.arange(channel.time.size)
         value, _ = interpolation(run.grid, channel.time - late, each, channel.time.size)
         predicted = np.asarray(value @ (nodes + beside)) + itself
+        if index in moved:
+            predicted = predicted + moves_at(run, channel.time) @ moved[index].T
         fits += _axes(run.recording.name, channel, predicted, run.offset)
     return fits
 
@@ -65,6 +71,26 @@ def _likeliest(problem: Problem, run: Run, linearised: Linearised) -> dict[int, 
         beside[:, off.column] = off.at_nodes @ amounts[:first]
         itself[:, off.column] = off.at_samples @ amounts[first:]
     return out
+
+
+def _moved(problem: Problem, run: Run, linearised: Linearised) -> dict[int, Array]:
+    """(w, MOVES) by channel how its zeros moved, where they are freed; what every device's do is noise."""
+    bench = problem.bench
+    if bench.freed is None:
+        return {}
+    stds = [bench.wander_of(c.quantity) for c in run.channels]
+    moves = likeliest_moves(run, linearised.wander, linearised.residual, stds)
+    return {i: m for i, m in moves.items() if run.channels[i].quantity == bench.freed}
+
+
+def _beside(run: Run, linearised: Linearised, moved: dict[int, Array]) -> Linearised:
+    """The run with its residuals beside zeros that ``moved``: a force that follows them is none."""
+    plain = linearised.plain.copy()
+    for index, moves in moved.items():
+        for axis, own in zip(run.channels[index].axes, moves, strict=True):
+            rows = (linearised.channel == index) & (linearised.axis == axis)
+            plain[rows] -= moves_at(run, run.grid.step * linearised.nodes[rows]) @ own
+    return replace(linearised, plain=plain)
 
 
 #: Hz. Smoother than a film; the slowest swing of a rig has many frames still.

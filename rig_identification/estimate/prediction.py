@@ -19,7 +19,7 @@ from rig_identification.estimate.parameters import MOUNT_SIZE, MOUNTED, DeviceLa
 from rig_identification.estimate.side_by_side import spare
 from rig_identification.estimate.unseen import unseen_of
 from rig_identification.estimate.unseen_sway import without_sway
-from rig_identification.estimate.wander import MOVES, wander_of, zero_moves
+from rig_identification.estimate.wander import FREED, MOVES, wander_of, zero_moves
 from rig_identification.estimate.whitening import filter_of, smooth, whiten
 from rig_identification.model import layout, sensors, work
 from rig_identification.model.constraints import rigid_jacobian
@@ -51,6 +51,11 @@ class Bench:
     mocap: sensors.MocapMount | None = None
     unseen: bool = False  # nothing that was measured tells how far the body swings (unseen_swing.py)
     calm: float = 1.0  # share of what is believed of that swing's size that a fit leaves it
+    freed: str | None = None  # quantity whose zeros move FREED times as far as every device's (wander.py)
+
+    def wander_of(self, quantity: str) -> float:
+        """Std of a run's own deviation from a quantity's zero, in its unit; 0 where it has none."""
+        return wander_of(self.rig, quantity) * (FREED if quantity == self.freed else 1.0)
 
     def of(self, run: Run) -> Bench:
         """The bench as it is during a run: a number may count in some stretches alone (Parameter.during)."""
@@ -339,7 +344,7 @@ def linearise_run(
     at, which = np.concatenate(nodes)[order], which[order]
     axis, variance = np.empty(size, dtype=np.int64), np.empty(size)
     H, D = np.empty((size, motion.states.shape[1])), np.empty((size, 6))
-    wandering = [wander_of(bench.rig, c.quantity) for c in run.channels]
+    wandering = [bench.wander_of(c.quantity) for c in run.channels]
     count = zero = 1 + known + starts
     zeros = MOVES * sum(c.width for c, std in zip(run.channels, wandering, strict=True) if std > 0.0)
     columns = np.empty((size, count + zeros))

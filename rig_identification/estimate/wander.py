@@ -14,7 +14,7 @@ means scatter as their blocks do (rest_evidence.py).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +24,7 @@ from rig_identification.rig import Rig
 
 if TYPE_CHECKING:
     from rig_identification.estimate.evidence import Channel, Run
+    from rig_identification.estimate.marginal import Marginal
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ Array = NDArray[np.float64]
 WANDER = 0.1
 #: Ways in which a zero moves of itself: from one recording to the next, and along one.
 MOVES = 2
+#: How many times as far zeros move that are freed: ten times their tolerance.
+FREED = 100.0
 #: Tolerance of each quantity's zero.
 ZEROS = {
     "tension": "load_cell_zero",
@@ -58,6 +61,26 @@ def wander_of(rig: Rig, quantity: str, tolerances: Mapping[str, str] = ZEROS) ->
 
 def zero_moves(run: Run, channel: Channel) -> Array:
     """(groups, MOVES) how a zero deviates in a run in each of the ways, in stds of its wander."""
-    time = run.grid.step * channel.node
+    return moves_at(run, np.asarray(run.grid.step * channel.node, dtype=np.float64))
+
+
+def moves_at(run: Run, time: Array) -> Array:
+    """(n, MOVES) the same at instants of a run, s after node 0."""
     along = (time - 0.5 * run.grid.duration) / max(run.recording.duration, 1.0)
     return np.stack([np.ones_like(along), along], axis=1)
+
+
+def likeliest_moves(run: Run, wander: Marginal, residual: Array, stds: Sequence[float]) -> dict[int, Array]:
+    """(w, MOVES) by channel how far its zeros are off in each way, as a run's residuals make it likeliest.
+
+    stds: of each channel's wander, 0 where it has none. Of whitened rows e, W e the ``residual``, the
+    amounts' mean is B^T W^2 e (marginal.py).
+    """
+    amounts = wander.responses.T @ wander.without(residual[:, None])[:, 0]
+    out, first = {}, 0
+    for index, (channel, std) in enumerate(zip(run.channels, stds, strict=True)):
+        if std > 0.0:
+            own = amounts[first : first + MOVES * channel.width].reshape(channel.width, MOVES)
+            out[index] = np.asarray(std * own)
+            first += MOVES * channel.width
+    return out

@@ -23,6 +23,7 @@ from rig_identification.search.ladder import Rung
 from rig_identification.search.levels import ALONE
 from rig_identification.search.search import Outcome, first_rung, problem_of, search
 from rig_identification.search.unexplained import unexplained
+from rig_identification.search.wandering import wandering_zeros
 
 Notify = Callable[[str, float], None]
 #: Is told the last model with a discrepancy.
@@ -117,7 +118,7 @@ def _explain(
         found = explained_changed(ideal, asked.changes, rest_explained, notify)
     if found is not None or part:
         return found
-    return unexplained(ideal, outcome, budget, notify)
+    return wandering_zeros(ideal, notify, budget) or unexplained(ideal, outcome, budget, notify)
 
 
 def _nothing(rest: Ideal) -> Explained:
