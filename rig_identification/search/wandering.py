@@ -23,6 +23,7 @@ from rig_identification.estimate.evidence import Channel, Run
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.identify import Ideal, fitted_anew, judged, near_noise
 from rig_identification.estimate.prediction import Linearised
+from rig_identification.estimate.solve import Problem, evaluate, excess
 from rig_identification.estimate.wander import ZEROS, wander_of
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of, held_out_errors
@@ -33,6 +34,8 @@ from rig_identification.result import Finding, Mismatch
 Array = NDArray[np.float64]
 Notify = Callable[[str, float], None]
 
+#: Share of the fitted runs' excess that free zeros have to take away before anything is fitted anew.
+CHIEF = 0.5
 #: Std of every device's wander beyond which an axis is told.
 BEYOND = 5.0
 #: Word and number of the recording contract for each quantity's zero.
@@ -46,25 +49,36 @@ NAMES = {
 
 def wandering_zeros(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     """What explains the session where one quantity's zeros move further than they may; None: nothing does."""
-    measured = {c.quantity for run in ideal.fitted.problem.runs for c in run.channels}
-    found: list[tuple[Ideal, str]] = []
-    for quantity in ZEROS:
-        if quantity not in measured or budget.late():
-            continue
-        notify(f"search: zeros of {quantity.replace('_', ' ')} that move", 0.94)
-        free = _freed(ideal, quantity, notify)
-        if free is not None and free.mismatch.verdict == "none":
-            found.append((free, quantity))
-    if not found:
+    fitted = ideal.fitted
+    measured = {c.quantity for run in fitted.problem.runs for c in run.channels}
+    takes = {q: _takes(fitted, q) for q in ZEROS if q in measured}
+    if budget.late() or not takes:
         return None
-    best, quantity = min(found, key=lambda f: f[0].fitted.evaluation.cost)
-    return _told(ideal, best, quantity)
+    quantity = max(takes, key=lambda q: takes[q])
+    if takes[quantity] < CHIEF * excess(fitted.evaluation):
+        return None
+    notify(f"search: zeros of {quantity.replace('_', ' ')} that move", 0.94)
+    free = _freed(ideal, quantity, notify)
+    if free is None or free.mismatch.verdict != "none":
+        return None
+    return _told(ideal, free, quantity)
+
+
+def _with_free_zeros(problem: Problem, quantity: str) -> Problem:
+    """The problem with the zeros of one quantity free to move."""
+    return replace(problem, bench=replace(problem.bench, freed=quantity))
+
+
+def _takes(fitted: Fitted, quantity: str) -> float:
+    """Nats that free zeros of a quantity take away from the fitted runs, everything else as it was fitted."""
+    freed = evaluate(_with_free_zeros(fitted.problem, quantity), fitted.evaluation.point)
+    return -np.inf if freed is None else float(fitted.evaluation.cost - freed.cost)
 
 
 def _freed(ideal: Ideal, quantity: str, notify: Notify) -> Ideal | None:
     """The ideal model fitted with the zeros of a quantity free to move; None where it cannot be followed."""
     fitted = ideal.fitted
-    problem = replace(fitted.problem, bench=replace(fitted.problem.bench, freed=quantity))
+    problem = _with_free_zeros(fitted.problem, quantity)
     point = replace(fitted.evaluation.point, latents=())
     held = (*fitted.holdout_runs, *fitted.lost)
     try:
@@ -74,8 +88,8 @@ def _freed(ideal: Ideal, quantity: str, notify: Notify) -> Ideal | None:
     return Ideal(again, *judged(again)) if near_noise(again) else None
 
 
-def _told(ideal: Ideal, free: Ideal, quantity: str) -> Explained:
-    """The explanation with the zeros of a quantity free."""
+def _told(ideal: Ideal, free: Ideal, quantity: str) -> Explained | None:
+    """The explanation with the zeros of a quantity free; None where none of them is far off."""
     evidence = evidence_of(ideal, free.fitted, free.scores.holdout)
     rig = ideal.fitted.problem.bench.rig
     found = [
@@ -83,6 +97,8 @@ def _told(ideal: Ideal, free: Ideal, quantity: str) -> Explained:
         for (device, axis), moves in _moves(free.fitted, quantity).items()
         if max(abs(m) for m, _, _ in moves) > BEYOND * wander_of(rig, quantity)
     ]
+    if not found:
+        return None
     errors = held_out_errors(ideal.scores.holdout, free.scores.holdout)
     what = quantity.replace("_", " ")
     text = f"With zeros of the {what} that move in and between recordings every residual is noise. {errors}"
