@@ -94,8 +94,10 @@ def _told(ideal: Ideal, free: Ideal, quantity: str) -> Explained | None:
     rig = ideal.fitted.problem.bench.rig
     found = [
         replace(_finding(device, axis, quantity, moves), evidence=evidence)
-        for (device, axis), moves in _moves(free.fitted, quantity).items()
-        if max(abs(m) for m, _, _ in moves) > BEYOND * wander_of(rig, quantity)
+        for (device, axis), moves in sorted(
+            _moves(free.fitted, quantity).items(), key=_farthest, reverse=True
+        )
+        if _farthest((device, moves)) > BEYOND * wander_of(rig, quantity)
     ]
     if not found:
         return None
@@ -103,6 +105,11 @@ def _told(ideal: Ideal, free: Ideal, quantity: str) -> Explained | None:
     what = quantity.replace("_", " ")
     text = f"With zeros of the {what} that move in and between recordings every residual is noise. {errors}"
     return Explained(free.fitted, Mismatch("explained", text, tuple(found), ()), ideal)
+
+
+def _farthest(of: tuple[object, list[Move]]) -> float:
+    """How far off an axis' zero is at most, in any recording."""
+    return max(abs(off) for off, _, _ in of[1])
 
 
 #: Of one recording: by how much a zero is off at most, its std, and the recording's name.
