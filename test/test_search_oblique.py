@@ -59,7 +59,7 @@ def test_a_direction_of_any_length_is_the_same_part_at_another_frequency() -> No
     plain = sample.model(rods=True)
     plain = plain.referred(settle(plain, sample.start))
     u, v, frequency, damping = 0.8, -0.4, 5.0, 0.06
-    length = lean({"p.direction.x": u, "p.direction.z": v}, "p")
+    length = lean(u, v)
     line = np.array([u, 1.0, v])
     as_written = rider(40.0, AT, line[None], frequency, damping)
     as_told = rider(40.0, AT, line[None] / length, frequency / length, damping * length)

@@ -33,7 +33,7 @@ def partly(
     """Whether names are told that leave so much, and make the wrench weaker by so many levels."""
     monkeypatch.setattr(unexplained, "misfit", lambda evaluation: left)
     monkeypatch.setattr(unexplained, "hear", lambda fitted: SimpleNamespace(contradicted=contradicted))
-    monkeypatch.setattr(unexplained, "judged", lambda fitted: (SimpleNamespace(holdout=held_out), None))
+    monkeypatch.setattr(unexplained, "scores", lambda fitted: SimpleNamespace(holdout=held_out))
     told = SimpleNamespace(findings=("named",) if named else ())
     found = SimpleNamespace(possible=possible, fitted=SimpleNamespace(evaluation=None), mismatch=told)
     first, likeliest = (SimpleNamespace(rung=SimpleNamespace(level=level)) for level in (1, 1 + weaker))

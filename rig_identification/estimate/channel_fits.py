@@ -85,6 +85,8 @@ def _moved(problem: Problem, run: Run, linearised: Linearised) -> dict[int, Arra
 
 def _beside(run: Run, linearised: Linearised, moved: dict[int, Array]) -> Linearised:
     """The run with its residuals beside zeros that ``moved``: a force that follows them is none."""
+    if not moved:
+        return linearised
     plain = linearised.plain.copy()
     for index, moves in moved.items():
         for axis, own in zip(run.channels[index].axes, moves, strict=True):

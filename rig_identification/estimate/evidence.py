@@ -146,6 +146,12 @@ class Channel:
         power = self.colour.power(frequency)[:, place] / self.slow[place] ** 2
         return np.asarray(np.maximum(power, 1.0))
 
+    def keeping(self, kept: NDArray[np.bool_], grid: Grid) -> Channel:
+        """The channel with those of its samples (n,) alone that are ``kept``."""
+        time = self.time[kept]
+        group, node = group_by_node(grid, time)
+        return replace(self, time=time, values=self.values[kept], group=group, node=node)
+
     @cached_property
     def grouped(self) -> Array:
         """(groups, w) mean of each group."""
@@ -403,9 +409,7 @@ def away_from_jumps(run: Run) -> Run:
         if np.count_nonzero(kept) < LEFT * kept.size:
             # A force that does nothing but jump: what is beside its jumps is all there is
             return run
-        time = channel.time[kept]
-        group, node = group_by_node(run.grid, time)
-        channels.append(replace(channel, time=time, values=channel.values[kept], group=group, node=node))
+        channels.append(channel.keeping(kept, run.grid))
     return replace(run, channels=tuple(channels))
 
 

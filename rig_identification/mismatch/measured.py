@@ -19,17 +19,15 @@ from rig_identification.model.motion import on_cables
 
 Array = NDArray[np.float64]
 
-#: Std of the random wrench, over a tenth of a second, as a share of the body's weight; and those, each weaker
-#: than the one before, of which the likeliest is looked for. Beside a weaker one than the last what is fitted
-#: takes a blow up.
-SHARE, SHARES = 0.05, tuple(1e-4 * 3.0**k for k in range(6, -1, -1))
+#: Stds of the random wrench, over a tenth of a second, as shares of the body's weight, each weaker than the
+#: one before, of which the likeliest is looked for. Beside a weaker one than the last what is fitted takes a
+#: blow up.
+SHARES = tuple(1e-4 * 3.0**k for k in range(6, -1, -1))
 #: Rounds in which the motion is brought to what was measured.
 ROUNDS = 2
 
 
-def with_wrench(
-    problem: Problem, point: Point, mass: float, share: float = SHARE
-) -> tuple[Problem, Point] | None:
+def with_wrench(problem: Problem, point: Point, mass: float, share: float) -> tuple[Problem, Point] | None:
     """The problem with a random wrench beside the model, and the point at which it follows what was measured.
 
     None where a run cannot be followed. mass: kg, roughly. share: std of the wrench over a tenth of a

@@ -261,7 +261,7 @@ class _Fitted:
         """Its one line leans, as that promises."""
         effect = self.swing.effect
         leans = {name: float(np.clip(v, -LEANING, LEANING)) for name, v in promise.values.items()}
-        length = lean(leans, effect)
+        length = lean(*leans.values())
         (frequency,) = self.frequencies.values()
         leans[f"{effect}.frequency"] = frequency * length
         leans[f"{effect}.damping_ratio"] = self.number("damping_ratio") / length

@@ -13,6 +13,8 @@ its own inertia I about a body axis e
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,34 +127,27 @@ def tilt(effect: str, axis: str, first: int) -> tuple[Parameter, ...]:
     )
 
 
-def lean(values: dict[str, float], effect: str) -> float:
-    """Length of a line's direction, as :func:`tilt` has it. values: with its numbers, or without."""
-    return float(np.sqrt(1.0 + sum(values.get(f"{effect}.direction.{a}", 0.0) ** 2 for a in AXES)))
+def lean(*parts: float) -> float:
+    """Length of a line's direction that leans by ``parts``, as :func:`tilt` has them."""
+    return math.hypot(1.0, *parts)
 
 
 def _along_line(found: Estimates, effect: str, axis: str) -> Told:
     """Frequency, damping and direction of a part whose line leans."""
-    names = [f"{effect}.direction.{a}" for a in AXES if a != axis]
+    others = [a for a in AXES if a != axis]
+    names = [f"{effect}.direction.{a}" for a in others]
 
-    def long(u: float, v: float) -> float:
-        return float(np.sqrt(1.0 + u * u + v * v))
+    def told(of: Callable[..., float], unit: str, *number: str) -> tuple[float, float, str]:
+        """What follows from a number of the part, if any is named, and from how its line leans."""
+        return *found.following(of, *(f"{effect}.{n}" for n in number), *names), unit
 
     out: Told = {
-        "frequency": (
-            *found.following(lambda f, u, v: f / long(u, v), f"{effect}.frequency", *names),
-            "Hz",
-        ),
-        "damping_ratio": (
-            *found.following(lambda z, u, v: z * long(u, v), f"{effect}.damping_ratio", *names),
-            "1",
-        ),
-        f"direction_{axis}": (*found.following(lambda u, v: 1.0 / long(u, v), *names), "1"),
+        "frequency": told(lambda f, u, v: f / lean(u, v), "Hz", "frequency"),
+        "damping_ratio": told(lambda z, u, v: z * lean(u, v), "1", "damping_ratio"),
+        f"direction_{axis}": told(lambda u, v: 1.0 / lean(u, v), "1"),
     }
-    for k, a in enumerate(a for a in AXES if a != axis):
-        out[f"direction_{a}"] = (
-            *found.following(lambda u, v, k=k: (u, v)[k] / long(u, v), *names),
-            "1",
-        )
+    for k, a in enumerate(others):
+        out[f"direction_{a}"] = told(lambda u, v, k=k: (u, v)[k] / lean(u, v), "1")
     return out
 
 

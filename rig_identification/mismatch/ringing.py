@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from rig_identification.estimate.evidence import Run
-from rig_identification.estimate.sampling import group_by_node
 from rig_identification.mismatch.slack import shocks
 
 #: What rings, and how long (s) before and after a shock: two nodes, and a few periods of a cable's ringing.
@@ -23,7 +22,7 @@ CALM = 0.5
 
 
 def without_ringing(run: Run) -> Run:
-    """The run without the samples that may ring after blows."""
+    """The run without the samples that may ring after blows; itself where there are none."""
     spells = shocks(run)
     channels = []
     for c in run.channels:
@@ -32,9 +31,8 @@ def without_ringing(run: Run) -> Run:
             time = c.time + run.offset
             for shock in spells:
                 kept &= (time < shock.start - BEFORE) | (time > shock.end + AFTER)
-        if np.mean(kept) < CALM or np.all(kept):
-            channels.append(c)
-            continue
-        group, node = group_by_node(run.grid, c.time[kept])
-        channels.append(replace(c, time=c.time[kept], values=c.values[kept], group=group, node=node))
+        rings = not np.all(kept) and np.mean(kept) >= CALM
+        channels.append(c.keeping(kept, run.grid) if rings else c)
+    if all(calm is c for calm, c in zip(channels, run.channels, strict=True)):
+        return run
     return replace(run, channels=tuple(channels))

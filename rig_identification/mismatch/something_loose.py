@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -46,16 +45,19 @@ def loose_finding(fitted: Fitted, before: float | None, *, scan: bool = True) ->
     """
     problem = with_reference(fitted.problem, fitted.rest)
     mass = mass_of(problem, fitted.evaluation)
-    seen, held = measured(problem, fitted.evaluation.point, mass), _held_out(fitted, problem, mass)
+    runs, holdouts = fitted.problem.runs, fitted.holdout_runs
+    seen = measured(problem, fitted.evaluation.point, mass)
     if seen is None:
         return None
-    middle = middle_of(problem.bench.rig)
+    middle, held = middle_of(problem.bench.rig), _held_out(fitted, problem, mass, holdouts)
     knocks = _convincing(seen, held, mass)
     if knocks is None:
         # Blows may be told best by what does not ring with them
-        calm = replace(problem, runs=tuple(map(without_ringing, problem.runs)))
-        calm_seen = measured(calm, fitted.evaluation.point, mass)
-        knocks = _convincing(calm_seen, _held_out(fitted, calm, mass, without_ringing), mass)
+        calm, calm_held = (tuple(map(without_ringing, of)) for of in (runs, holdouts))
+        if any(a is not b for a, b in zip((*calm, *calm_held), (*runs, *holdouts), strict=True)):
+            quiet = replace(problem, runs=calm)
+            calm_seen = measured(quiet, fitted.evaluation.point, mass)
+            knocks = _convincing(calm_seen, _held_out(fitted, quiet, mass, calm_held), mass)
     if knocks is not None:
         return _told_by_blows(knocks, middle, before)
     if not scan:
@@ -85,14 +87,11 @@ def _convincing(seen: Measured, held: Measured, mass: float) -> Knocks | None:
     return knocks if knocks.mass < FARTHEST * LIKELY * mass else None
 
 
-def _held_out(
-    fitted: Fitted, problem: Problem, mass: float, prepared: Callable[[Run], Run] | None = None
-) -> Measured:
-    """Held-out runs about their measured motion; None where there is none that can be followed."""
+def _held_out(fitted: Fitted, problem: Problem, mass: float, runs: tuple[Run, ...]) -> Measured:
+    """Held-out ``runs`` about their measured motion; None where there is none that can be followed."""
     if not fitted.holdouts:
         return None
     point = fitted.evaluation.point
-    runs = fitted.holdout_runs if prepared is None else tuple(map(prepared, fitted.holdout_runs))
     held = replace(problem, runs=runs, rests=())
     starts = tuple(run.motion.state(0) for run in fitted.holdouts)
     return measured(held, Point(point.theta, starts, ()), mass)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig_identification.estimate.fitted import Fitted
 from rig_identification.estimate.growing import misfit
-from rig_identification.estimate.identify import Ideal, fitted_anew, judged
+from rig_identification.estimate.identify import Ideal, fitted_anew, judged, scores
 from rig_identification.estimate.verdict import hear
 from rig_identification.mismatch.budget import Budget
 from rig_identification.mismatch.explained import Explained, evidence_of
@@ -109,7 +109,7 @@ def _partly(outcome: Outcome) -> Explained | None:
     if not hear(best.fitted).contradicted:
         return best
     # Sharp numbers that another run moves by some std are no other physics where they predict that run
-    held_out = judged(best.fitted)[0].holdout
+    held_out = scores(best.fitted).holdout
     return best if held_out is not None and held_out < PREDICTS else None
 
 

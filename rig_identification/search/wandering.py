@@ -49,10 +49,12 @@ NAMES = {
 
 def wandering_zeros(ideal: Ideal, notify: Notify, budget: Budget) -> Explained | None:
     """What explains the session where one quantity's zeros move further than they may; None: nothing does."""
+    if budget.late():
+        return None
     fitted = ideal.fitted
     measured = {c.quantity for run in fitted.problem.runs for c in run.channels}
     takes = {q: _takes(fitted, q) for q in ZEROS if q in measured}
-    if budget.late() or not takes:
+    if not takes:
         return None
     quantity = max(takes, key=lambda q: takes[q])
     if takes[quantity] < CHIEF * excess(fitted.evaluation):
