@@ -92,3 +92,20 @@ def test_what_each_gains_alone_is_its_evidence_over_none(seed: int) -> None:
     signed = gains_alone(*posterior(design[:, :1], -data), [[0]], [True])
     other = gains_alone(*posterior(design[:, :1], data), [[0]], [True])
     assert sorted([signed[0], other[0]])[0] == -np.inf
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_number_that_two_effects_share_is_in_the_model_with_either(seed: int) -> None:
+    """Two laws of one hinge share how it is twisted: leaving one out leaves the share to the other."""
+    rng = np.random.default_rng(seed)
+    design = rng.standard_normal((60, 3))
+    data = design @ [1.5, 1.0, 0.0] + rng.standard_normal(60)
+    groups = [[0, 1], [2, 1]]
+    best, covariance = posterior(design, data)
+    scores = {}
+    for kept in [(), (0,), (1,), (0, 1)]:
+        columns = sorted({i for k in kept for i in groups[k]})
+        scores[kept] = evidence(design[:, columns], data) - float(len(kept))
+    assert best_subset(best, covariance, groups, [False] * 2, [1.0] * 2) == max(
+        scores, key=lambda kept: scores[kept]
+    )

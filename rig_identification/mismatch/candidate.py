@@ -60,6 +60,11 @@ class Candidate:
         return f"{self.effect} {self.where.get('law', '')}".strip()
 
     @property
+    def amounts(self) -> tuple[Parameter, ...]:
+        """The numbers that say how much of it there is; all of them where none is such."""
+        return self.parameters[: self.positive + self.either_way] or self.parameters
+
+    @property
     def doubted(self) -> bool:
         """Whether the lab doubts these numbers itself: nothing is added to the model."""
         return all(p.freed for p in self.parameters)

@@ -34,7 +34,7 @@ def best_subset(
     """Groups of numbers (effects) that belong into the model.
 
     best: (n,) where the cost is lowest, in units of the prior's std; covariance: (n, n) there; groups: which
-    of these numbers are each effect's; positive: whether the first of them cannot be negative; penalties:
+    of these numbers are each effect's (one may be of several); positive: whether the first of them cannot be negative; penalties:
     nats that an effect has to gain beyond its evidence; apart: pairs of effects of which one alone can be.
     Returns the kept effects' places in ``groups``.
     """
@@ -62,7 +62,8 @@ def _score(
     best: Array, covariance: Array, groups: list[list[int]], positive: list[bool], kept: tuple[int, ...]
 ) -> float:
     """Log evidence of a subset less a constant; minus infinity where a positive number would not be."""
-    out = [i for k in range(len(groups)) if k not in kept for i in groups[k]]
+    inside = {i for k in kept for i in groups[k]}
+    out = sorted({i for group in groups for i in group} - inside)
     value, score = best, 0.0
     if out:
         held = covariance[np.ix_(out, out)] + np.diag(FLOOR * (np.diag(covariance)[out] + FLOOR))

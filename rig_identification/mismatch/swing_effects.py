@@ -284,7 +284,7 @@ def _all_at_once(
         return None
     parameters = wide.bench.parameters
     groups = [[parameters.index_of(p.name) for p in c.parameters] for c in candidates]
-    mine = [i for group in groups for i in group]
+    mine = sorted({i for group in groups for i in group})
     rest = free_without(wide, point, full, {p.name for c in candidates for p in c.parameters}, 0)
     index = np.concatenate([rest, np.array(mine, dtype=rest.dtype)])
     covariance = invert_information(full.information[np.ix_(index, index)])

@@ -89,13 +89,16 @@ def near_noise_models(bare: Problem, first: Whole, rest: State, budget: Budget) 
 
 
 def _close(choice: Choice) -> list[Trial]:
-    """Laws that hardly trail by themselves, and have no more numbers than what the pieces chose."""
-    numbers = sum(len(c.parameters) for c in choice.chosen)
+    """Laws that hardly trail by themselves, and have no more amounts than what the pieces chose.
+
+    A shape that the runs do not tell costs a law nothing: its interval stays the prior's.
+    """
+    amounts = sum(len(c.amounts) for c in choice.chosen)
     return [
         t
         for t in choice.alone
         if choice.alone[0].evidence - t.evidence < CLOSE
-        and len(t.candidate.parameters) <= numbers
+        and len(t.candidate.amounts) <= amounts
         and choice.chosen != (t.candidate,)
     ]
 

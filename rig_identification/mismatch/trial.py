@@ -353,8 +353,7 @@ def may_be_none(trial: Trial) -> bool:
     A number that is a ratio is never none.
     """
     free = {p.name: p for p in trial.problem.bench.parameters.free}
-    own, seen = trial.candidate.parameters, in_stds(trial)
-    amounts = own[: trial.candidate.positive + trial.candidate.either_way] or own
+    amounts, seen = trial.candidate.amounts, in_stds(trial)
     if any(free[p.name].ratio for p in amounts):
         return False
     return all(abs(seen[p.name]) < NORMAL_95 for p in amounts)
