@@ -49,6 +49,10 @@ DAMPINGS = (0.006, 0.03, 0.12)
 AT_ONCE, SPARSE = 12, FREQUENCIES[::2]
 #: Places lie within so much of ``spread_of`` about the middle.
 REACH = 1.2
+#: Steps (tangent of the angle) by which lines between the axes are tried: a grid first.
+LINES = (1.0, 0.4, 0.4, 0.2, 0.1, 0.1)
+#: Axis along which a rider travels, and along which it feels what drives that.
+Pairs = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
     """
     for first in range(0, len(FREQUENCIES), AT_ONCE):
         frequencies = FREQUENCIES[first : first + AT_ONCE]
-        alone = {axis: _responses(problem, beyond, axis, frequencies, (DAMPING,)) for axis in AXES}
+        alone = {axis: _responses(problem, beyond, ((axis, axis),), frequencies, (DAMPING,)) for axis in AXES}
         for directions, axes in DIRECTIONS.items():
             responses = alone[axes[0]]
             for axis in axes[1:]:
@@ -94,7 +98,7 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
 
     One frequency after the other, from the axis that explains most by itself. mass: kg, of the body.
     """
-    alone = {axis: _responses(problem, beyond, axis, SPARSE, (DAMPING,)) for axis in AXES}
+    alone = {axis: _responses(problem, beyond, ((axis, axis),), SPARSE, (DAMPING,)) for axis in AXES}
     columns = {axis: beyond.of(responses) for axis, responses in alone.items()}
 
     def of(chosen: dict[str, int]) -> Ridden | None:
@@ -129,6 +133,56 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
         chosen[axis] = k
         best = next(found for found, a, i in tried if (a, i) == (axis, k))
     return best
+
+
+def along_a_line(
+    problem: Problem, beyond: Beyond, frequency: float, damping: float, mass: float
+) -> tuple[Ridden, Array] | None:
+    """A part that moves along one line between the axes, and its line (3,), a unit vector.
+
+    Its travel along a line n is driven by what it feels along n, and acts along n: its response is the sum
+    of n_i n_j times that of a rider that travels along axis i, driven by axis j. So six responses tell those
+    along all lines. frequency: Hz; damping: ratio; mass: kg, of the body.
+    """
+    pairs = [(i, j) for i in range(3) for j in range(i, 3)]
+    names: list[Pairs] = [((AXES[i], AXES[j]), (AXES[j], AXES[i]))[: 1 + (i != j)] for i, j in pairs]
+    responses = [_responses(problem, beyond, which, (frequency,), (damping,)) for which in names]
+    columns = [beyond.of(r) for r in responses]
+
+    def of(line: Array) -> Ridden | None:
+        parts = [line[i] * line[j] for i, j in pairs]
+        both = Columns(
+            np.sum([w * c.seen for w, c in zip(parts, columns, strict=True)], axis=0),
+            np.sum([w * c.solved for w, c in zip(parts, columns, strict=True)], axis=0),
+            np.sum([w * c.right for w, c in zip(parts, columns, strict=True)], axis=0),
+        )
+        own = [
+            np.sum([w * r[k] for w, r in zip(parts, responses, strict=True)], axis=0)
+            for k in range(len(beyond.full.runs))
+        ]
+        axis = int(np.argmax(np.abs(line)))
+        # A number of its own for the frequency: that along the axis (riders.tilt)
+        swing = Swing(AXES[axis], frequency / abs(float(line[axis])), tilted=True)
+        return _ridden(swing, damping, 0, both, own, mass)
+
+    best: tuple[Ridden, Array] | None = None
+    for step in LINES:
+        center = None if best is None else best[1]
+        for line in _lines_about(center, step):
+            found = of(line)
+            if found is not None and (best is None or found.best.gain > best[0].best.gain):
+                best = found, line
+    return best
+
+
+def _lines_about(center: Array | None, step: float) -> list[Array]:
+    """Unit vectors (3,): about ``center`` by steps to either side, or all of a grid, one of each line."""
+    if center is None:
+        grid = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if v > (0.0, 0.0, 0.0)])
+        return [np.asarray(v / np.linalg.norm(v)) for v in grid]
+    sides = np.linalg.svd(center[None])[2][1:]
+    moved = [center + step * (a * sides[0] + b * sides[1]) for a, b in product((-1, 0, 1), repeat=2)]
+    return [np.asarray(v / np.linalg.norm(v)) for v in moved]
 
 
 def turning_too(problem: Problem, beyond: Beyond, ridden: Ridden, mass: float) -> Ridden | None:
@@ -213,7 +267,7 @@ def other_ways(
     for axis in AXES:
         if axis in known:
             continue
-        responses = _responses(problem, beyond, axis, FREQUENCIES, (DAMPING,))
+        responses = _responses(problem, beyond, ((axis, axis),), FREQUENCIES, (DAMPING,))
         found, gains = beyond.of(responses), np.zeros(len(FREQUENCIES))
         for k in range(len(FREQUENCIES)):
             columns, own = _one_of(found, responses, k)
@@ -284,7 +338,7 @@ def _ridden(
 def columns_of(problem: Problem, beyond: Beyond, ridden: Ridden) -> list[Array]:
     """(m, TERMS) what a rider's kilogram does to every run's samples, by place."""
     swing = ridden.swing
-    return _responses(problem, beyond, swing.directions, (swing.frequency,), (ridden.damping,))
+    return _responses(problem, beyond, _along(swing.directions), (swing.frequency,), (ridden.damping,))
 
 
 def finer(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden | None:
@@ -306,7 +360,7 @@ def _around(
 ) -> Iterator[Ridden]:
     """Swings at ``factors`` of a frequency, damped in every way: all at once, which reads a Jacobian once."""
     frequencies = [center.frequency * factor for factor in factors]
-    responses = _responses(problem, beyond, center.directions, frequencies, DAMPINGS)
+    responses = _responses(problem, beyond, _along(center.directions), frequencies, DAMPINGS)
     found = beyond.of(responses)
     for k, (frequency, damping) in enumerate(product(frequencies, DAMPINGS)):
         tried = replace(center, frequency=frequency)
@@ -320,25 +374,31 @@ def spread_of(problem: Problem) -> float:
     return 0.5 * float(np.max(extent(problem.bench.rig)))
 
 
+def _along(directions: str) -> Pairs:
+    """Each of the axes along which a part moves answers what it feels along itself."""
+    return tuple((axis, axis) for axis in DIRECTIONS[directions])
+
+
 def _responses(
     problem: Problem,
     beyond: Beyond,
-    directions: str,
+    pairs: Pairs,
     frequencies: Sequence[float],
     dampings: Sequence[float],
 ) -> list[Array]:
     """(m, TERMS F D) what a kilogram of every rider does to every run's samples, by place."""
     full = beyond.full
-    wrenches = _wrenches(problem, full, directions, list(product(frequencies, dampings)))
+    wrenches = _wrenches(problem, full, pairs, list(product(frequencies, dampings)))
     return [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(full.runs)]
 
 
 def _wrenches(
-    problem: Problem, evaluation: Evaluation, directions: str, kinds: list[tuple[float, float]]
+    problem: Problem, evaluation: Evaluation, pairs: Pairs, kinds: list[tuple[float, float]]
 ) -> dict[int, Array]:
     """(N, 6, TERMS K) wrench per kilogram, by place, for each run of the problem.
 
-    kinds: frequency (Hz) and damping ratio of every rider.
+    pairs: axes along which riders travel, and those along which they feel what drives that. kinds: frequency
+    (Hz) and damping ratio of every rider.
     """
     model = problem.bench.parameters.model
     first = layout.effects_offset(model.cables) + place.REFERENCE_ROTATION
@@ -351,8 +411,9 @@ def _wrenches(
         wrench = np.zeros((raw.shape[0], 6, TERMS * len(kinds)))
         for k, (frequency, damping) in enumerate(kinds):
             mine = wrench[:, :, TERMS * k : TERMS * (k + 1)]
-            for axis in DIRECTIONS[directions]:
-                _swing_along(mine, AXES.index(axis), felt, down, tilted, at, frequency, damping, step)
+            for moving, driving in pairs:
+                along = AXES.index(moving), AXES.index(driving)
+                _swing_along(mine, along, felt, down, tilted, at, frequency, damping, step)
         return wrench
 
     return _of_runs(problem, evaluation, of)
@@ -426,7 +487,7 @@ def travel_along(
 
 def _swing_along(
     out: Array,
-    i: int,
+    along: tuple[int, int],
     felt: Array,
     down: Array,
     tilted: Array,
@@ -435,10 +496,14 @@ def _swing_along(
     damping: float,
     step: float,
 ) -> None:
-    """Add to ``out`` (N, 6, TERMS) a swinging kilogram's wrench along axis ``i`` less a fixed one's."""
-    force = felt[:, i].copy()
-    force[:, 0] += down[i]
-    q, push = travel_along(force, float(tilted[i]), frequency, damping, step)
+    """Add to ``out`` (N, 6, TERMS) the wrench of a swinging kilogram less a fixed one's.
+
+    along: axis along which it travels, and that along which it feels what drives the travel.
+    """
+    i, driving = along
+    force = felt[:, driving].copy()
+    force[:, 0] += down[driving]
+    q, push = travel_along(force, float(tilted[driving]), frequency, damping, step)
     j, k = (i + 1) % 3, (i + 2) % 3
     out[:, i, :4] += push
     # at x push and q x felt, of vectors along axis i

@@ -22,6 +22,7 @@ from rig_identification.mismatch.in_motion import unearned_of
 from rig_identification.mismatch.opened import Promise, opened_with, promise_of
 from rig_identification.mismatch.rider_places import (
     Ridden,
+    along_a_line,
     columns_of,
     finer,
     on_springs_all_ways,
@@ -52,6 +53,8 @@ COARSE = 0.5
 KEPT = 0.5
 #: Share of what is promised that first order is right within.
 AS_MUCH = 0.5
+#: Word of the recording contract, and numbers by which a line leans.
+SPRUNG, LEANS = "sprung_mass", 2
 #: How far a line may lean where it is fitted first, of its own axis' part: to first order it knows no end.
 LEANING = 1.0
 #: Share of the best promise of an effect that another one of the same has to come to, to be fitted as well.
@@ -74,20 +77,41 @@ def rider_promises(problem: Problem, beyond: Beyond, mass: float, count: int) ->
             most = max([ridden.best.gain, *(r.best.gain for r in swings)])
             swings.append(ridden if ridden.best.gain > KEPT * most else replace(ridden, runs=[]))
     bodies = []
-    if problem.discrepancy is not None and "sprung_mass.mass" not in taken:
+    if problem.discrepancy is not None and f"{SPRUNG}.mass" not in taken:
         bodies = _bodies_on_springs(problem, beyond, mass, found)
     best = [_best_swings(problem, beyond, swings, mass) for swings in found.values()]
     best.sort(key=lambda peaks: -peaks[0].gain)
     all_ways = [_ridden_promise(problem, beyond, every, mass) for every in bodies]
     # Only what may come to be the best of them, and beyond chance
     least = COARSE * max([least, *(peaks[0].gain for peaks in best)])
-    return [
-        *(
-            _with_elsewhere([_best_near(problem, beyond, p, mass) if p.gain > least else p for p in peaks])
-            for peaks in best
-        ),
-        *all_ways,
+    near = [
+        _with_elsewhere([_best_near(problem, beyond, p, mass) if p.gain > least else p for p in peaks])
+        for peaks in best
     ]
+    return [*near, *_between_axes(problem, beyond, [p for p in near if p.gain > least], mass), *all_ways]
+
+
+def _between_axes(problem: Problem, beyond: Beyond, along: list[Promise], mass: float) -> list[Promise]:
+    """A part on springs along a line between the axes, where that promises more than along the best of them.
+
+    along: promises of riders; the line is looked for at the frequency and damping of the best of one axis.
+    """
+    axes = [p for p in along if p.candidate.where["axis"] is not None]
+    if not axes:
+        return []
+    best = max(axes, key=lambda p: p.gain)
+    found = along_a_line(problem, beyond, _frequency(best), best.values[f"{SPRUNG}.damping_ratio"], mass)
+    if found is None:
+        return []
+    ridden, line = found
+    promise = _ridden_promise(problem, beyond, ridden, mass)
+    needed = 0.5 * float(chi2.isf(FALSE_ALARM, LEANS))
+    if promise.gain < max(p.gain for p in along) + needed:
+        return []
+    axis = AXES.index(ridden.swing.directions)
+    leans = {f"{SPRUNG}.direction.{a}": float(line[i] / line[axis]) for i, a in enumerate(AXES) if i != axis}
+    damping = promise.values[f"{SPRUNG}.damping_ratio"] / lean(*leans.values())
+    return [replace(promise, values=promise.values | leans | {f"{SPRUNG}.damping_ratio": damping})]
 
 
 def _bodies_on_springs(
@@ -97,7 +121,7 @@ def _bodies_on_springs(
 
     found: swings along each direction that were scanned. mass: kg, of the body.
     """
-    along = [r for (effect, _), swings in found.items() if effect == "sprung_mass" for r in swings]
+    along = [r for (effect, _), swings in found.items() if effect == SPRUNG for r in swings]
     every = on_springs_all_ways(problem, beyond, mass)
     parts = [every] if every is not None else []
     parts += [max(along, key=lambda r: r.best.gain)] if along else []
@@ -151,13 +175,17 @@ def _with_elsewhere(peaks: list[Promise]) -> Promise:
 
 def _finer(problem: Problem, beyond: Beyond, coarse: Promise, mass: float) -> list[Promise]:
     """A rider's promise at its best frequency, damping and place."""
-    effect = coarse.candidate.effect
-    frequency = next(p.nominal for p in coarse.candidate.parameters if p.name == f"{effect}.frequency")
     axis = coarse.candidate.where["axis"]
-    found = finer(problem, beyond, Swing("xy" if axis is None else str(axis), frequency), mass)
+    found = finer(problem, beyond, Swing("xy" if axis is None else str(axis), _frequency(coarse)), mass)
     if found is None:
         return []
     return [_ridden_promise(problem, beyond, found, mass)]
+
+
+def _frequency(promise: Promise) -> float:
+    """Hz of a rider that has one frequency."""
+    name = f"{promise.candidate.effect}.frequency"
+    return next(p.nominal for p in promise.candidate.parameters if p.name == name)
 
 
 def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float) -> Promise:
@@ -168,7 +196,7 @@ def _ridden_promise(problem: Problem, beyond: Beyond, found: Ridden, mass: float
         gain -= _unearned(problem, beyond, found.columns, found.weights, runs)
     at = middle_of(problem.bench.rig) + spread_of(problem) * best.place
     candidate, values = rider_candidate(problem, found.swing, mass, float(best.amounts[0]), at)
-    more = further_ways if found.swing.effect == "sprung_mass" else springs_instead
+    more = further_ways if found.swing.effect == SPRUNG else springs_instead
     candidate = replace(candidate, between=partial(more, found.swing, mass))
     for (a, _), inertia in zip(found.swing.turning, best.amounts[1:], strict=True):
         values[f"{found.swing.effect}.inertia.{a}"] = float(inertia)
@@ -302,7 +330,7 @@ def springs_instead(
     values = problem.bench.parameters.named(evaluation.point.theta)
     amount, frequency = values[f"{swing.effect}.mass"], values[f"{swing.effect}.frequency"]
     opened = opened_with(problem, evaluation, []) if amount > 0.0 else None
-    if opened is None or "sprung_mass.mass" in values:
+    if opened is None or f"{SPRUNG}.mass" in values:
         return []
     at = np.array([values[f"{swing.effect}.position.{a}"] for a in AXES])
     ways = other_ways(problem, opened[1], swing.directions, amount, at)

@@ -34,8 +34,9 @@ def best_subset(
     """Groups of numbers (effects) that belong into the model.
 
     best: (n,) where the cost is lowest, in units of the prior's std; covariance: (n, n) there; groups: which
-    of these numbers are each effect's (one may be of several); positive: whether the first of them cannot be negative; penalties:
-    nats that an effect has to gain beyond its evidence; apart: pairs of effects of which one alone can be.
+    of these numbers are each effect's (one may be of several); positive: whether the first of them cannot be
+    negative; penalties: nats that an effect has to gain beyond its evidence; apart: pairs of effects of which
+    one alone can be.
     Returns the kept effects' places in ``groups``.
     """
     chosen: tuple[int, ...] = ()
