@@ -18,7 +18,8 @@ from rig_identification.estimate.growing import settled_starts
 from rig_identification.estimate.identify import fit_session
 from rig_identification.estimate.solve import Evaluation, Problem, evaluate, solve
 from rig_identification.mismatch.candidate import Candidate
-from rig_identification.mismatch.opened import carried, extended, with_reference
+from rig_identification.mismatch.opened import carried, extended, opened_with, with_reference
+from rig_identification.mismatch.rider_places import along_a_line, finer
 from rig_identification.mismatch.rider_promises import further_ways, springs_instead
 from rig_identification.mismatch.riders import Swing, lean, rider_candidate
 from rig_identification.mismatch.trial import promised
@@ -148,3 +149,30 @@ def test_a_liquid_is_asked_as_a_part_on_springs_along_its_axes() -> None:
     part, _ = rider_candidate(problem, Swing("z", 3.0), 800.0, 10.0, AT)
     both, there = fitted_with(part, wide, there, 10.0)
     assert springs_instead(liquid, 800.0, both, there) == []
+
+
+def test_a_line_between_all_axes_is_told_to_first_order() -> None:
+    """It promises more along its line than along any axis, and that line is near the true one."""
+    spec = shaken(10, 10.0)
+    body, line = float(spec.elements[0]), np.array([0.6, -0.7, 0.4]) / np.sqrt(1.01)
+    effects = {
+        "sprung_mass.mass": (0.03 * body,),
+        "sprung_mass.frequency": (5.0,),
+        "sprung_mass.damping_ratio": (0.03,),
+        "sprung_mass.direction": tuple(float(c) for c in line),
+        "sprung_mass.position": tuple(float(c) for c in spec.elements[1:4]),
+    }
+    fit = fit_session(
+        simulate_session(replace(spec, effects=effects, doubts=False), np.random.default_rng(6))[0]
+    )
+    problem = with_reference(fit.problem, fit.rest)
+    there = evaluate(problem, fit.evaluation.point)
+    assert there is not None
+    _, beyond, _ = opened_with(problem, there, [])
+    found = along_a_line(problem, beyond, 5.0, 0.03, body)
+    assert found is not None
+    ridden, direction = found
+    assert abs(float(direction @ line)) > np.cos(np.radians(30.0))
+    assert ridden.swing.tilted
+    along = [finer(problem, beyond, Swing(axis, 5.0), body) for axis in "xyz"]
+    assert ridden.best.gain > 1.2 * max(a.best.gain for a in along if a is not None)
