@@ -51,8 +51,8 @@ AT_ONCE, SPARSE = 12, FREQUENCIES[::2]
 REACH = 1.2
 #: Steps (tangent of the angle) by which lines between the axes are tried: a grid first.
 LINES = (1.0, 0.4, 0.4, 0.2, 0.1, 0.1)
-#: Axis along which a rider travels, and along which it feels what drives that.
-Pairs = tuple[tuple[str, str], ...]
+#: Axis along which a rider travels, that along which it feels what drives this, and how much of that counts.
+Ways = tuple[tuple[str, str, float], ...]
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def scanned(problem: Problem, beyond: Beyond, mass: float) -> Iterator[Ridden]:
     """
     for first in range(0, len(FREQUENCIES), AT_ONCE):
         frequencies = FREQUENCIES[first : first + AT_ONCE]
-        alone = {axis: _responses(problem, beyond, ((axis, axis),), frequencies, (DAMPING,)) for axis in AXES}
+        alone = {axis: _responses(problem, beyond, _along(axis), frequencies, (DAMPING,)) for axis in AXES}
         for directions, axes in DIRECTIONS.items():
             responses = alone[axes[0]]
             for axis in axes[1:]:
@@ -98,7 +98,7 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
 
     One frequency after the other, from the axis that explains most by itself. mass: kg, of the body.
     """
-    alone = {axis: _responses(problem, beyond, ((axis, axis),), SPARSE, (DAMPING,)) for axis in AXES}
+    alone = {axis: _responses(problem, beyond, _along(axis), SPARSE, (DAMPING,)) for axis in AXES}
     columns = {axis: beyond.of(responses) for axis, responses in alone.items()}
 
     def of(chosen: dict[str, int]) -> Ridden | None:
@@ -142,11 +142,26 @@ def along_a_line(
 
     Its travel along a line n is driven by what it feels along n, and acts along n: its response is the sum
     of n_i n_j times that of a rider that travels along axis i, driven by axis j. So six responses tell those
-    along all lines. frequency: Hz; damping: ratio; mass: kg, of the body.
+    along all lines. frequency: Hz, and damping: ratio, near which it is looked for; mass: kg, of the body.
     """
+    found = _best_line(problem, beyond, frequency, damping, mass)
+    if found is None:
+        return None
+    nearer = finer(problem, beyond, found[0].swing, mass, found[1])
+    if nearer is None or nearer.best.gain <= found[0].best.gain:
+        return found
+    again = _best_line(problem, beyond, nearer.swing.frequency, nearer.damping, mass)
+    return found if again is None else max(found, again, key=lambda f: f[0].best.gain)
+
+
+def _best_line(
+    problem: Problem, beyond: Beyond, frequency: float, damping: float, mass: float
+) -> tuple[Ridden, Array] | None:
     pairs = [(i, j) for i in range(3) for j in range(i, 3)]
-    names: list[Pairs] = [((AXES[i], AXES[j]), (AXES[j], AXES[i]))[: 1 + (i != j)] for i, j in pairs]
-    responses = [_responses(problem, beyond, which, (frequency,), (damping,)) for which in names]
+    crossed: list[Ways] = [
+        ((AXES[i], AXES[j], 1.0), (AXES[j], AXES[i], 1.0))[: 1 + (i != j)] for i, j in pairs
+    ]
+    responses = [_responses(problem, beyond, ways, (frequency,), (damping,)) for ways in crossed]
     columns = [beyond.of(r) for r in responses]
 
     def of(line: Array) -> Ridden | None:
@@ -160,9 +175,7 @@ def along_a_line(
             np.sum([w * r[k] for w, r in zip(parts, responses, strict=True)], axis=0)
             for k in range(len(beyond.full.runs))
         ]
-        axis = int(np.argmax(np.abs(line)))
-        # A number of its own for the frequency: that along the axis (riders.tilt)
-        swing = Swing(AXES[axis], frequency / abs(float(line[axis])), tilted=True)
+        swing = Swing(AXES[int(np.argmax(np.abs(line)))], frequency, tilted=True)
         return _ridden(swing, damping, 0, both, own, mass)
 
     best: tuple[Ridden, Array] | None = None
@@ -267,7 +280,7 @@ def other_ways(
     for axis in AXES:
         if axis in known:
             continue
-        responses = _responses(problem, beyond, ((axis, axis),), FREQUENCIES, (DAMPING,))
+        responses = _responses(problem, beyond, _along(axis), FREQUENCIES, (DAMPING,))
         found, gains = beyond.of(responses), np.zeros(len(FREQUENCIES))
         for k in range(len(FREQUENCIES)):
             columns, own = _one_of(found, responses, k)
@@ -341,26 +354,29 @@ def columns_of(problem: Problem, beyond: Beyond, ridden: Ridden) -> list[Array]:
     return _responses(problem, beyond, _along(swing.directions), (swing.frequency,), (ridden.damping,))
 
 
-def finer(problem: Problem, beyond: Beyond, swing: Swing, mass: float) -> Ridden | None:
+def finer(
+    problem: Problem, beyond: Beyond, swing: Swing, mass: float, line: Array | None = None
+) -> Ridden | None:
     """The best frequency, damping and place near those of ``swing``; None where no mass promises anything.
 
-    mass: kg, of the body.
+    mass: kg, of the body. line: (3,) unit vector of a part that moves between the axes, with its frequency.
     """
     best: Ridden | None = None
+    ways = _along(swing.directions) if line is None else _between(line)
     for factors in (COARSE, FINE):
         center = swing if best is None else best.swing
-        for found in _around(problem, beyond, center, factors, mass):
+        for found in _around(problem, beyond, center, ways, factors, mass):
             if best is None or found.best.gain > best.best.gain:
                 best = found
     return best
 
 
 def _around(
-    problem: Problem, beyond: Beyond, center: Swing, factors: Sequence[float], mass: float
+    problem: Problem, beyond: Beyond, center: Swing, ways: Ways, factors: Sequence[float], mass: float
 ) -> Iterator[Ridden]:
     """Swings at ``factors`` of a frequency, damped in every way: all at once, which reads a Jacobian once."""
     frequencies = [center.frequency * factor for factor in factors]
-    responses = _responses(problem, beyond, _along(center.directions), frequencies, DAMPINGS)
+    responses = _responses(problem, beyond, ways, frequencies, DAMPINGS)
     found = beyond.of(responses)
     for k, (frequency, damping) in enumerate(product(frequencies, DAMPINGS)):
         tried = replace(center, frequency=frequency)
@@ -374,31 +390,35 @@ def spread_of(problem: Problem) -> float:
     return 0.5 * float(np.max(extent(problem.bench.rig)))
 
 
-def _along(directions: str) -> Pairs:
+def _along(directions: str) -> Ways:
     """Each of the axes along which a part moves answers what it feels along itself."""
-    return tuple((axis, axis) for axis in DIRECTIONS[directions])
+    return tuple((axis, axis, 1.0) for axis in DIRECTIONS[directions])
+
+
+def _between(line: Array) -> Ways:
+    """A part that moves along a line (3,), a unit vector, answers what it feels along that."""
+    return tuple((a, b, float(line[i] * line[j])) for i, a in enumerate(AXES) for j, b in enumerate(AXES))
 
 
 def _responses(
     problem: Problem,
     beyond: Beyond,
-    pairs: Pairs,
+    ways: Ways,
     frequencies: Sequence[float],
     dampings: Sequence[float],
 ) -> list[Array]:
     """(m, TERMS F D) what a kilogram of every rider does to every run's samples, by place."""
     full = beyond.full
-    wrenches = _wrenches(problem, full, pairs, list(product(frequencies, dampings)))
+    wrenches = _wrenches(problem, full, ways, list(product(frequencies, dampings)))
     return [whitened_response(run, wrenches[i], smooth=True) for i, run in enumerate(full.runs)]
 
 
 def _wrenches(
-    problem: Problem, evaluation: Evaluation, pairs: Pairs, kinds: list[tuple[float, float]]
+    problem: Problem, evaluation: Evaluation, ways: Ways, kinds: list[tuple[float, float]]
 ) -> dict[int, Array]:
     """(N, 6, TERMS K) wrench per kilogram, by place, for each run of the problem.
 
-    pairs: axes along which riders travel, and those along which they feel what drives that. kinds: frequency
-    (Hz) and damping ratio of every rider.
+    kinds: frequency (Hz) and damping ratio of every rider.
     """
     model = problem.bench.parameters.model
     first = layout.effects_offset(model.cables) + place.REFERENCE_ROTATION
@@ -411,9 +431,9 @@ def _wrenches(
         wrench = np.zeros((raw.shape[0], 6, TERMS * len(kinds)))
         for k, (frequency, damping) in enumerate(kinds):
             mine = wrench[:, :, TERMS * k : TERMS * (k + 1)]
-            for moving, driving in pairs:
+            for moving, driving, share in ways:
                 along = AXES.index(moving), AXES.index(driving)
-                _swing_along(mine, along, felt, down, tilted, at, frequency, damping, step)
+                _swing_along(mine, along, share, felt, down, tilted, at, frequency, damping, step)
         return wrench
 
     return _of_runs(problem, evaluation, of)
@@ -488,6 +508,7 @@ def travel_along(
 def _swing_along(
     out: Array,
     along: tuple[int, int],
+    share: float,
     felt: Array,
     down: Array,
     tilted: Array,
@@ -498,12 +519,13 @@ def _swing_along(
 ) -> None:
     """Add to ``out`` (N, 6, TERMS) the wrench of a swinging kilogram less a fixed one's.
 
-    along: axis along which it travels, and that along which it feels what drives the travel.
+    along: axis along which it travels, and that along which it feels what drives the travel; share: how much
+    of that counts.
     """
     i, driving = along
-    force = felt[:, driving].copy()
-    force[:, 0] += down[driving]
-    q, push = travel_along(force, float(tilted[driving]), frequency, damping, step)
+    force = share * felt[:, driving]
+    force[:, 0] += share * down[driving]
+    q, push = travel_along(force, share * float(tilted[driving]), frequency, damping, step)
     j, k = (i + 1) % 3, (i + 2) % 3
     out[:, i, :4] += push
     # at x push and q x felt, of vectors along axis i

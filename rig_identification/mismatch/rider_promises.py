@@ -104,14 +104,17 @@ def _between_axes(problem: Problem, beyond: Beyond, along: list[Promise], mass: 
     if found is None:
         return []
     ridden, line = found
-    promise = _ridden_promise(problem, beyond, ridden, mass)
     needed = 0.5 * float(chi2.isf(FALSE_ALARM, LEANS))
-    if promise.gain < max(p.gain for p in along) + needed:
-        return []
     axis = AXES.index(ridden.swing.directions)
     leans = {f"{SPRUNG}.direction.{a}": float(line[i] / line[axis]) for i, a in enumerate(AXES) if i != axis}
-    damping = promise.values[f"{SPRUNG}.damping_ratio"] / lean(*leans.values())
-    return [replace(promise, values=promise.values | leans | {f"{SPRUNG}.damping_ratio": damping})]
+    length = lean(*leans.values())
+    # A number of its own for the frequency: that along the axis (riders.tilt)
+    ridden = replace(ridden, swing=replace(ridden.swing, frequency=length * ridden.swing.frequency))
+    promise = _ridden_promise(problem, beyond, ridden, mass)
+    if promise.gain < max(p.gain for p in along) + needed:
+        return []
+    leans[f"{SPRUNG}.damping_ratio"] = ridden.damping / length
+    return [replace(promise, values=promise.values | leans)]
 
 
 def _bodies_on_springs(
