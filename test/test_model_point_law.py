@@ -96,6 +96,7 @@ def test_derivatives_of_a_law() -> None:
     state, drive = moving(sample, plain, 5), drive_of(31, 0.01, 5)
     block = place.effects_block(model.cables)
     model.physics[block + place.LAW_SATURATION], model.physics[block + place.LAW_UPRIGHT] = 4.0, 0.7
+    model.physics[block + place.LAW_ACROSS] = 0.3
     own = {
         block + first + i: step
         for first, count, step in (
@@ -106,6 +107,7 @@ def test_derivatives_of_a_law() -> None:
             (place.LAW_NARROW, 1, 1e-2),
             (place.LAW_SATURATION, 1, 1e-2),
             (place.LAW_UPRIGHT, 1, 1e-2),
+            (place.LAW_ACROSS, 1, 1e-2),
         )
         for i in range(count)
     }
@@ -126,6 +128,11 @@ def test_derivatives_of_a_law() -> None:
             marks=pytest.mark.long,
         ),
         pytest.param({"point_law.brake": (0.0, 900.0)}, "quadratic_damping", id="square_brake"),
+        pytest.param(
+            {"point_law.brake": (300.0, 0.0), "point_law.across": (0.0,), "point_law.line": (1.2, 0.3)},
+            "damping",
+            id="dashpot",
+        ),
     ],
 )
 def test_a_concealed_law_is_told_by_its_one_part(effects: dict[str, tuple[float, ...]], part: str) -> None:

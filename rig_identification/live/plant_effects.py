@@ -112,6 +112,7 @@ class PlantEffects:
     law_narrow: float = 0.0  # 1/m^2
     law_saturation: float = 0.0  # s^2/m^2
     law_upright: float = 1.0  # 1
+    law_across: float = 1.0  # 1
     exciter_gain: float = 0.0  # 0.01: the true force is 1 % above the measured one
     cable_length: Array = field(default_factory=lambda: np.zeros(1))  # m that cables are longer, each or all
     ceiling_points: Array = field(default_factory=lambda: np.zeros((1, 3)))  # (n, 3) m, world: hinges' errors
@@ -178,6 +179,7 @@ def with_effects(model: RigModel, effects: PlantEffects) -> RigModel:
     physics[block + place.LAW_NARROW] = effects.law_narrow
     physics[block + place.LAW_SATURATION] = effects.law_saturation
     physics[block + place.LAW_UPRIGHT] = effects.law_upright
+    physics[block + place.LAW_ACROSS] = effects.law_across
     for k, numbers in enumerate(effects.own):
         first = place.own_block(block, k) + place.OWN_NUMBERS
         physics[first : first + len(numbers)] = numbers

@@ -1,8 +1,9 @@
 """Physics that no entry of the catalogue has, as a sparse law: a force at a point that follows its motion.
 
-Two families (model/effects/point_law.py): a spring along some line with a linear, a square and a cubic part,
-and a brake with a linear and a square part that may fade with distance. Between them they hold what hardens,
-softens, attracts, rubs and drags at one place, which is most of what hangs on or near a body unnoticed.
+Three families (model/effects/point_law.py): a spring along some line with a linear, a square and a cubic
+part, a brake with a linear and a square part that may fade with distance, and one along some line. Between
+them they hold what hardens, softens, attracts, rubs and drags at one place, which is most of what hangs on or
+near a body unnoticed.
 
 Where it acts is tried (place_scan.py). A law has many numbers, and something of it bends to anything: it is
 told only where it leaves nothing in any run and the catalogue does not come near it.
@@ -37,7 +38,7 @@ from rig_identification.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Lines along which a spring is tried at first: azimuth and elevation, rad.
+#: Lines along which a spring or a brake is tried at first: azimuth and elevation, rad.
 LINES = ((0.0, 0.0), (0.5 * np.pi, 0.0), (0.25 * np.pi, 0.0), (-0.25 * np.pi, 0.0), (0.0, 1.3))
 #: Widths of a brake's reach that are tried, in parts of the largest travel; 0: it does not fade.
 NARROWS = (0.0, 0.5, 2.0)
@@ -48,6 +49,8 @@ EARLY = (3.0, 30.0)
 SHARPER = 30.0
 #: How far a brake counts the vertical at first: between not at all, 0, and like any other direction, 1.
 UPRIGHT = 0.5
+#: Std of how far a brake along a line counts what is across it.
+ACROSS_STD = 0.3
 #: Std of a line's angles, rad.
 TURNED = 0.5
 #: Contract-like names and units of the parts.
@@ -74,20 +77,35 @@ def spring_law(rig: Rig, scales: Scales, line: tuple[float, float]) -> Candidate
         added(f"unknown.{name}", unit, scales.force / scales.travel ** (k + 1), block + place.LAW_SPRING + k)
         for k, (name, unit) in enumerate(SPRINGS)
     )
-    angles = tuple(
+    return _law((*amounts, *_line(block, line), *_point(rig, scales)), 0)
+
+
+def line_brake_law(rig: Rig, scales: Scales, line: tuple[float, float]) -> Candidate:
+    """A brake at a point about along ``line``, with every part: a dashpot, a magnet, a slide in a slot."""
+    block = layout.effects_offset(len(rig.cables))
+    across = added("unknown.across", "1", ACROSS_STD, block + place.LAW_ACROSS)
+    return _law((*_brake_amounts(block, scales), across, *_line(block, line), *_point(rig, scales)), 1)
+
+
+def _line(block: int, line: tuple[float, float]) -> tuple[Parameter, ...]:
+    """Angles of a law's line, near those of ``line``. block: first entry of the effects."""
+    return tuple(
         added(f"unknown.{name}", "rad", TURNED, block + place.LAW_DIRECTION + i, line[i])
         for i, name in enumerate(("azimuth", "elevation"))
     )
-    return _law((*amounts, *angles, *_point(rig, scales)), 0)
+
+
+def _brake_amounts(block: int, scales: Scales) -> tuple[Parameter, ...]:
+    return tuple(
+        added(f"unknown.{name}", unit, scales.force / scales.speed ** (k + 1), block + place.LAW_BRAKE + k)
+        for k, (name, unit) in enumerate(BRAKES)
+    )
 
 
 def brake_law(rig: Rig, scales: Scales, early: float = 0.0) -> Candidate:
     """A brake at a point that may fade with distance, or saturates so ``early``, with every part."""
     block = layout.effects_offset(len(rig.cables))
-    amounts = tuple(
-        added(f"unknown.{name}", unit, scales.force / scales.speed ** (k + 1), block + place.LAW_BRAKE + k)
-        for k, (name, unit) in enumerate(BRAKES)
-    )
+    amounts = _brake_amounts(block, scales)
     bent = added("unknown.narrow", "1/m^2", 1.0 / scales.travel**2, block + place.LAW_NARROW)
     if early > 0.0:
         known = early / scales.speed**2
@@ -146,6 +164,7 @@ def _told(found: Estimates) -> Told:
             *SPRINGS,
             *BRAKES,
             ("upright", "1"),
+            ("across", "1"),
             ("narrow", "1/m^2"),
             ("saturation", "s^2/m^2"),
             ("azimuth", "rad"),
@@ -160,21 +179,22 @@ def _told(found: Estimates) -> Told:
 
 @dataclass(frozen=True)
 class Law:
-    """What is tried of a law at every place: a spring along a ``line``, a brake that fades or saturates."""
+    """What is tried of a law at every place: a spring or brake along a ``line``, or a brake to all sides."""
 
     line: tuple[float, float] | None
+    brakes: bool = False  # along the line; without one every law is a brake
     narrow: float = 0.0  # in parts of what fades over the largest travel
     early: float = 0.0  # squares of the largest speed in parts of that from which on it saturates
 
     @property
     def parts(self) -> tuple[tuple[str, str], ...]:
         """Names and units of its amounts."""
-        return BRAKES if self.line is None else SPRINGS
+        return BRAKES if self.line is None or self.brakes else SPRINGS
 
     def candidate(self, rig: Rig, scales: Scales) -> Candidate:
         """The law with every part of it."""
         if self.line is not None:
-            return spring_law(rig, scales, self.line)
+            return (line_brake_law if self.brakes else spring_law)(rig, scales, self.line)
         return brake_law(rig, scales, self.early)
 
     def values(self, law: Candidate, at: Array, amounts: Array, scales: Scales) -> dict[str, float]:
@@ -192,12 +212,15 @@ class Law:
 
     def makes_sense(self, amounts: Array) -> bool:
         """Whether any part of a brake takes energy out; a spring may have either sign."""
-        return self.line is not None or bool(np.any(amounts > 0.0))
+        return self.parts == SPRINGS or bool(np.any(amounts > 0.0))
 
     def wrenches(self, model: RigModel, motion: Motion, at: Array, scales: Scales) -> Array:
         """(N, 6, parts) wrench about the datum, body axes, of a std of each part at the place ``at``."""
         u, v = followed(model, motion, at)
-        if self.line is not None:
+        if self.line is not None and self.brakes:
+            d = direction(*self.line)
+            force = _brakes(u / scales.travel, (v @ d)[:, None] * d / scales.speed, 0.0, 0.0)
+        elif self.line is not None:
             force = _pulls(u / scales.travel, *self.line)
         else:
             v = v * np.array([1.0, 1.0, UPRIGHT])
@@ -210,7 +233,8 @@ class Law:
 #: All laws that are tried at every place.
 LAWS = (
     *(Law(line) for line in LINES),
-    *(Law(None, narrow) for narrow in NARROWS),
+    *(Law(line, brakes=True) for line in LINES),
+    *(Law(None, narrow=narrow) for narrow in NARROWS),
     *(Law(None, early=early) for early in EARLY),
 )
 
@@ -281,6 +305,8 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
         for name in parts
     )
     acts = f"along {axis}" if parts[0] in dict(SPRINGS) else "against its motion"
+    if "across" in told:
+        acts += f" along a line near {axis}"
     fades = " and fades with distance from where that point hangs at rest" if "narrow" in told else ""
     if "saturation" in told:
         fades = f", and saturates at about {plain_figure(float(told['saturation']['value']) ** -0.5)} m/s"
@@ -293,7 +319,7 @@ def law_finding(fitted: Fitted, candidate: Candidate, plain: Finding) -> Finding
         f"{plain_figure(rms)} N (root mean square), up to {plain_figure(peak)} N. "
     )
     where = {**plain.where, "axis": axis, "position": [float(v) for v in at]}
-    if parts == ["quadratic_damping"] and not {"narrow", "saturation"} & told.keys():
+    if parts == ["quadratic_damping"] and not {"narrow", "saturation", "across"} & told.keys():
         # A force against the square of speed has a name, wherever it acts
         value, std = (float(told["quadratic_damping"][key]) / (0.5 * AIR) for key in ("value", "std"))
         told = written({"drag_area": (value, std, "m^2")}) | told
@@ -309,5 +335,7 @@ def _force(model: RigModel, motion: Motion, at: Array) -> Array:
     p, (u, v) = model.physics[block:], followed(model, motion, at)
     pulls = _pulls(u, *p[place.LAW_DIRECTION :][:2]) @ p[place.LAW_SPRING :][:3]
     v = v * np.array([1.0, 1.0, p[place.LAW_UPRIGHT]])
+    d, across = direction(*p[place.LAW_DIRECTION :][:2]), p[place.LAW_ACROSS]
+    v = across * v + (1.0 - across) * (v @ d)[:, None] * d
     brakes = _brakes(u, v, p[place.LAW_NARROW], p[place.LAW_SATURATION])
     return np.asarray(pulls + brakes @ p[place.LAW_BRAKE :][:2])

@@ -17,6 +17,8 @@ from rig_identification.model.effects.place import (
     CREEP,
     EFFECTS_SIZE,
     HINGE_TWIST,
+    LAW_ACROSS,
+    LAW_UPRIGHT,
     LINEAR_DENSITY,
     REFERENCE_POSITION,
     REFERENCE_ROTATION,
@@ -131,6 +133,8 @@ def rig_model(
         physics[o + layout.AXIAL_STIFFNESS] = axial_stiffness or 0.0
     physics[layout.effects_offset(n) + CREEP] = CREEP_RATE
     physics[layout.effects_offset(n) + HINGE_TWIST] = 1.0
+    physics[layout.effects_offset(n) + LAW_UPRIGHT] = 1.0
+    physics[layout.effects_offset(n) + LAW_ACROSS] = 1.0
     physics[layout.effects_offset(n) + LINEAR_DENSITY] = rig.cable_linear_density or 0.0
     physics[layout.effects_offset(n) + SHARING] = SOFTNESS if redundant(rig) else 0.0
     for k, effect in enumerate(own_effects()):
