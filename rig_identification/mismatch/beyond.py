@@ -27,6 +27,16 @@ class Columns:
         """Some of the columns."""
         return Columns(self.seen[:, chosen], self.solved[:, chosen], self.right[chosen])
 
+    @classmethod
+    def mixed(cls, several: Sequence[Columns], shares: Sequence[float]) -> Columns:
+        """The sum of ``several`` sets of as many columns, each by its share."""
+        pairs = list(zip(shares, several, strict=True))
+        return cls(
+            np.sum([w * c.seen for w, c in pairs], axis=0),
+            np.sum([w * c.solved for w, c in pairs], axis=0),
+            np.sum([w * c.right for w, c in pairs], axis=0),
+        )
+
     def information(self, rows: Sequence[Array]) -> Array:
         """(c, c) information that is left of these columns, which are ``rows`` (m, c) wherever they show."""
         return np.asarray(sum(own.T @ own for own in rows) - self.seen.T @ self.solved)

@@ -104,11 +104,7 @@ def on_springs_all_ways(problem: Problem, beyond: Beyond, mass: float) -> Ridden
     def of(chosen: dict[str, int]) -> Ridden | None:
         parts = {a: slice(TERMS * k, TERMS * (k + 1)) for a, k in chosen.items()}
         found = [columns[a].part(part) for a, part in parts.items()]
-        both = Columns(
-            np.sum([c.seen for c in found], axis=0),
-            np.sum([c.solved for c in found], axis=0),
-            np.sum([c.right for c in found], axis=0),
-        )
+        both = Columns.mixed(found, [1.0] * len(found))
         responses = [
             np.sum([alone[a][i][:, part] for a, part in parts.items()], axis=0)
             for i in range(len(beyond.full.runs))
@@ -166,11 +162,7 @@ def _best_line(
 
     def of(line: Array) -> Ridden | None:
         parts = [line[i] * line[j] for i, j in pairs]
-        both = Columns(
-            np.sum([w * c.seen for w, c in zip(parts, columns, strict=True)], axis=0),
-            np.sum([w * c.solved for w, c in zip(parts, columns, strict=True)], axis=0),
-            np.sum([w * c.right for w, c in zip(parts, columns, strict=True)], axis=0),
-        )
+        both = Columns.mixed(columns, parts)
         own = [
             np.sum([w * r[k] for w, r in zip(parts, responses, strict=True)], axis=0)
             for k in range(len(beyond.full.runs))
